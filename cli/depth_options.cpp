@@ -3,6 +3,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <map>
+
+#include "cli/number_checks.h"
+
 namespace dtr::cli {
 
 void AddDepthOptions(CLI::App& command, const std::vector<std::string>& engines,
@@ -39,6 +43,27 @@ void AddDepthOptions(CLI::App& command, const std::vector<std::string>& engines,
                   "which needs CUDA")
       ->check(CLI::ExistingDirectory)
       ->type_name("DIR");
+  CLI::Option* prior =
+      command
+          .add_option("--depth-prior", choice.prior.folder,
+                      "Folder of depth maps of the photos, by a phone or a depth camera, of any "
+                      "resolution: they start --engine patchmatch, decide where the photos do not, "
+                      "and are the depth with --engine prior")
+          ->check(CLI::ExistingDirectory)
+          ->type_name("DIR");
+  command
+      .add_option("--prior-unit", choice.prior.unit,
+                  "Scene units per number of such a map (0.001: millimetres of a set in metres)")
+      ->check(kPositive)
+      ->needs(prior)
+      ->type_name("U");
+  command
+      .add_option("--prior-kind", choice.prior.kind,
+                  "z: along the optical axis; ray: distance from the camera [z]")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, DepthKind>{
+          {"z", DepthKind::kPlaneZ}, {"ray", DepthKind::kRayDistance}}))
+      ->needs(prior)
+      ->type_name("z|ray");
   command
       .add_option(
           "--depth-error", choice.depth_error_px,

@@ -126,7 +126,9 @@ Lighting Daylight() {
   return light;
 }
 
-std::vector<std::string> SceneNames() { return {"courtyard", "plane", "stairs", "sphere", "room"}; }
+std::vector<std::string> SceneNames() {
+  return {"courtyard", "plane", "stairs", "sphere", "room", "plain-room"};
+}
 
 Scene MakeScene(const std::string& name, std::uint64_t seed, double time_s) {
   if (name == "sphere") return MakeSphere(seed, time_s);
@@ -136,9 +138,10 @@ Scene MakeScene(const std::string& name, std::uint64_t seed, double time_s) {
   if (name == "courtyard") return MakeCourtyard(seed);
   if (name == "plane") return MakePlane(seed);
   if (name == "stairs") return MakeStairs(seed);
-  if (name == "room") return MakeRoom(seed);
-  throw UsageError("scene: expected courtyard, plane, stairs, sphere or room, found '" + name +
-                   "'; see `dtr dataset list`");
+  if (name == "room") return MakeRoom(seed, false);
+  if (name == "plain-room") return MakeRoom(seed, true);
+  throw UsageError("scene: expected courtyard, plane, stairs, sphere, room or plain-room, found '" +
+                   name + "'; see `dtr dataset list`");
 }
 
 }  // namespace dtr::datasets

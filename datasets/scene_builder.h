@@ -49,7 +49,7 @@ void AddSky(SceneBuilder& builder, double radius);
 Lighting Daylight();
 
 Scene MakeCourtyard(std::uint64_t seed);
-Scene MakeRoom(std::uint64_t seed);
+Scene MakeRoom(std::uint64_t seed, bool plain);
 Scene MakePlane(std::uint64_t seed);
 Scene MakeStairs(std::uint64_t seed);
 Scene MakeSphere(std::uint64_t seed, double time_s = 0);

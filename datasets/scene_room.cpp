@@ -88,6 +88,13 @@ RoomPalette MakeRoomPalette(SceneBuilder& b) {
   return p;
 }
 
+/// Walls and ceiling in one colour each, as walls are painted: light falls on them, and that is all
+/// they show.
+void PaintPlain(SceneBuilder& b, RoomPalette& p) {
+  p.ceiling = b.Add({.pattern = Pattern::kFlat, .color = {0.72, 0.70, 0.66}});
+  p.plain = p.brick = p.paper = b.Add({.pattern = Pattern::kFlat, .color = {0.62, 0.58, 0.50}});
+}
+
 /// Floor, ceiling with beams, four walls of different stuff, skirting boards, window and door.
 void AddShell(SceneBuilder& b, const RoomPalette& p) {
   const Vector3d x = kHalfX * Vector3d::UnitX(), y = kHalfY * Vector3d::UnitY(),
@@ -214,10 +221,11 @@ void AddAlongWalls(SceneBuilder& b, const RoomPalette& p) {
 
 }  // namespace
 
-Scene MakeRoom(std::uint64_t seed) {
+Scene MakeRoom(std::uint64_t seed, bool plain) {
   SceneBuilder b(seed);
   Random random(HashOf(seed, 0x20u));
-  const RoomPalette p = MakeRoomPalette(b);
+  RoomPalette p = MakeRoomPalette(b);
+  if (plain) PaintPlain(b, p);
   AddShell(b, p);
   AddBookcase(b, p, -1.9, random);
   AddBookcase(b, p, -0.3, random);
@@ -238,7 +246,7 @@ Scene MakeRoom(std::uint64_t seed) {
   framing.inside = {0, 0, 1.5};
   framing.inside_radius = 0.7;
   framing.layouts = {"inside-out", "ring"};
-  return std::move(b).Build("room", light, framing);
+  return std::move(b).Build(plain ? "plain-room" : "room", light, framing);
 }
 
 }  // namespace dtr::datasets

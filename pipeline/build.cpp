@@ -133,6 +133,25 @@ SparseScene SparseOf(const CalibratedPhotos& calibrated, const std::vector<View>
   return calib::ToSparseScene(calibrated.model, names, cameras);
 }
 
+// The cameras of the photos themselves, whose depth maps are as distorted and as large as they.
+PhotoCameras PhotoCamerasOf(const CalibratedPhotos& calibrated, const std::vector<View>& views) {
+  std::map<std::string, const calib::LensCamera*> lens_of;
+  for (const calib::SfmImage& image : calibrated.model.images) {
+    lens_of[image.name] = &calibrated.model.cameras.at(image.camera_id);
+  }
+  PhotoCameras photos;
+  for (const View& view : views) {
+    const calib::LensCamera& lens = *lens_of.at(view.name);
+    io::NamedCamera photo;
+    photo.name = view.name;
+    // What the view was undistorted onto, which need not have the lens' own principal point.
+    photo.camera = view.camera.Resized(lens.width_px, lens.height_px);
+    if (!lens.IsUndistorted()) photo.distortion = {calib::NameOf(lens.model), lens.params};
+    photos[view.name] = std::move(photo);
+  }
+  return photos;
+}
+
 // The points that the source views alone would know: held-out photos move nothing.
 std::vector<SparsePoint> SourcePoints(const SparseScene& sparse, const std::vector<View>& views) {
   std::vector<bool> is_source;
@@ -255,7 +274,8 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
       {"photos", from_video ? VideoJson(options)
                             : PhotosJson(photos, std::vector<bool>(held_out.size(), true))},
       {"poses_sha256", PosesHash(options.poses)},
-      {"workspace_sha256", InputHash(options.depth.workspace)}};
+      {"workspace_sha256", InputHash(options.depth.workspace)},
+      {"prior_sha256", InputHash(options.depth.prior.folder)}};
   if (rig) fingerprint["rig_sha256"] = InputHash(options.rig);
   if (std::filesystem::exists(options.photos / capture::kCaptureFile)) {
     fingerprint["stored_sha256"] = StoredHashes(photos);
@@ -333,8 +353,10 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   const SparseScene sparse = SparseOf(calibrated, views);
 
   log.Begin("depth");
-  const stereo::QualitySettings spent = DepthStage(
-      set, sparse, options.depth, quality, {options.threads, options.seed}, writer, progress);
+  const DepthStageResult stage = DepthStage(
+      set, sparse, options.depth, quality,
+      {options.threads, options.seed, {}, PhotoCamerasOf(calibrated, views)}, writer, progress);
+  report.prior = stage.prior;
 
   log.Begin("finishing");
   FinishScene(set, SourcePoints(sparse, views), writer, options.threads, progress);
@@ -345,7 +367,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
     CompleteDepth(set, sparse, writer, options.threads, memory_gb, progress);
   }
   WriteMeshes(set, writer, options.threads, progress);
-  set.provenance_json = ProvenanceJson(options, OptionsJson(options, spent),
+  set.provenance_json = ProvenanceJson(options, OptionsJson(options, stage.quality),
                                        PhotosJson(photos, is_source), calibrated, report)
                             .dump();
   const SetValidation validation =
@@ -357,6 +379,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
                 .checks = validation.tests,
                 .skipped = report.skipped,
                 .not_registered = report.not_registered.size(),
+                .prior = report.prior,
                 .threads = options.threads},
                progress);
   AdviseOn(writer.folder(), set, report, options.threads, progress);

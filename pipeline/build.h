@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -55,13 +56,15 @@ struct BuildReport {
   std::vector<std::string> coverage;  ///< what the capture lacks, in words; empty without depth
   std::filesystem::path written;      ///< the set
   CalibrationReport calibration;
-  std::vector<io::RunStage> stages;  ///< what each cost
-  double peak_memory_mib = 0;        ///< with COLMAP's
+  std::optional<DepthPriorReport> prior;  ///< where there was one
+  std::vector<io::RunStage> stages;       ///< what each cost
+  double peak_memory_mib = 0;             ///< with COLMAP's
 };
 
 /// JSON object: set, views[].{name,role,width_px,height_px}, not_registered[], why_not_registered,
 /// skipped[], remarks[], contents, screening[], camera_sharing (where folders were compared),
-/// coverage[], validation_passed (null: not validated), stages[], peak_memory_mib.
+/// coverage[], validation_passed (null: not validated), depth_prior (where there was one),
+/// stages[], peak_memory_mib.
 std::string ToJson(const BuildReport& report);
 
 /// What BuildOptions::force_stage may be: the stages of which a build keeps something between runs,

@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 
+#include "pipeline/depth_prior.h"
 #include "stereo/engine.h"
 
 namespace dtr::pipeline {
@@ -31,7 +32,7 @@ inline constexpr int kMaxNeighbours = 8, kMaxIterations = 20, kMaxRounds = 8;
 
 /// What was asked for: a preset, and what overrides it.
 struct DepthChoice {
-  std::string engine = "patchmatch";  ///< "none": no depth
+  std::string engine = "patchmatch";  ///< "none": no depth; "prior": that of `prior`, as it is
   std::string preset = "balanced";
   std::optional<int> neighbours, round_neighbours, iterations, rounds;
   std::optional<double> time_budget_s;  ///< picks what is not given explicitly
@@ -40,6 +41,7 @@ struct DepthChoice {
   std::optional<double> depth_error_px;
   bool completion = true;           ///< depth is completed where none was measured
   std::filesystem::path workspace;  ///< for engine "colmap"; empty: the program fills one
+  DepthPriorChoice prior;           ///< for engines "patchmatch" and "prior"
 };
 
 /// Quality settings with what the choice gives explicitly in its place.

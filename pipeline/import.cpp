@@ -7,6 +7,7 @@
 #include "capture/ingest.h"
 #include "dtr/base/error.h"
 #include "dtr/base/temporary_folder.h"
+#include "dtr/io/formats/rgbd_capture.h"
 #include "dtr/io/set_io.h"
 #include "pipeline/detail/cameras/known_poses.h"
 #include "pipeline/detail/import/camera_distortion.h"
@@ -133,16 +134,37 @@ ImportOptions OptionsFor(const ImportRequest& request, CamerasFromFile& cameras,
   return options;
 }
 
+// Captures have folders of their own; what they have without a depth map is no view of a set with
+// depth.
+void TakeFolders(CamerasFromFile& cameras, ImportRequest& request) {
+  if (request.images.empty()) request.images = cameras.images_dir;
+  if (request.depth.empty()) request.depth = cameras.depth_dir;
+  if (cameras.depth_dir.empty() || request.depth != cameras.depth_dir) return;
+  std::erase_if(cameras.list.cameras, [&](const io::NamedCamera& named) {
+    if (!named.depth_file.empty()) return false;
+    cameras.skipped.emplace_back(named.name, "no depth map");
+    return true;
+  });
+  if (cameras.list.cameras.empty()) {
+    throw Error(request.cameras.string() + ": expected depth maps, found none");
+  }
+}
+
 }  // namespace
 
 ImportReport Import(ImportRequest request, Progress& listener) {
   RecordedNotes progress(listener);
+  if (request.images.empty() && io::RgbdFormatOf(request.cameras).empty()) {
+    throw UsageError(fmt::format("`images`: expected the folder of the images of {}, found none",
+                                 request.cameras.string()));
+  }
   CamerasFromFile cameras = ReadCameraFile(request.cameras, request.format,
                                            {.images = request.images,
                                             .depth = request.depth,
                                             .masks = request.masks,
                                             .allow_missing = request.allow_missing});
   for (const std::string& note : cameras.notes) progress.Note(note);
+  TakeFolders(cameras, request);
   const ImportOptions options = OptionsFor(request, cameras, progress);
   io::SetWriter::RequireTarget(request.output, request.force);
   ImportReport report;

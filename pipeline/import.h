@@ -17,8 +17,8 @@ namespace dtr::pipeline {
 struct ImportRequest {
   std::filesystem::path cameras;  ///< a file or folder of a format that CameraFormats() names
   std::string format;             ///< one of them; empty: by the content of `cameras`
-  std::filesystem::path images;   ///< folder of the images
-  std::filesystem::path depth;    ///< folder of depth maps; empty: COLMAP's points alone
+  std::filesystem::path images;   ///< folder of the images; empty: a capture's own
+  std::filesystem::path depth;    ///< folder of depth maps; empty: a capture's own, or points alone
   std::filesystem::path masks;    ///< empty: where `cameras` says, else `masks` beside the images
   std::optional<DepthKind> depth_kind;  ///< empty: what `cameras` says of each
   std::optional<double> depth_unit;     ///< scene units per number of a depth map

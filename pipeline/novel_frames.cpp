@@ -10,6 +10,7 @@
 #include "calib/colmap/model_io.h"
 #include "dtr/base/error.h"
 #include "dtr/io/formats/cameras_json.h"
+#include "dtr/io/formats/rgbd_capture.h"
 #include "dtr/io/formats/transforms_json.h"
 #include "dtr/render/camera_path.h"
 #include "pipeline/detail/cameras/camera_formats.h"
@@ -58,6 +59,7 @@ io::CameraList ReadCameras(const std::filesystem::path& file) {
   const std::string kind = format.name;
   if (kind == "cameras-json") return io::ReadCamerasJson(file);
   if (kind == "nerf") return FromTransforms(file);
+  if (io::IsRgbdFormat(kind)) return io::ReadRgbdCapture(file, kind).list;
   if (kind == "llff") {
     throw UsageError(file.string() +
                      ": its cameras have no names and no photos here; give a "

@@ -15,6 +15,8 @@
 #include "pipeline/detail/depth/quality_json.h"
 #include "pipeline/detail/pages/set_page.h"
 #include "pipeline/detail/photos/input_hash.h"
+#include "pipeline/detail/reports/prior_json.h"
+#include "pipeline/detail/reports/text.h"
 #include "pipeline/detail/run/finishing.h"
 #include "pipeline/detail/run/recorded_notes.h"
 #include "pipeline/detail/run/run_log.h"
@@ -67,6 +69,14 @@ void CopyImages(const std::filesystem::path& from, DtrSet& set, int threads, io:
 
 }  // namespace
 
+std::string ToJson(const RecomputeReport& report) {
+  nlohmann::ordered_json json = {{"set", report.written.string()},
+                                 {"depth_maps", report.depth_maps},
+                                 {"depth_completeness", report.depth_completeness}};
+  if (report.prior) json["depth_prior"] = JsonOf(*report.prior);
+  return Text(json);
+}
+
 RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listener) {
   const stereo::QualitySettings quality = QualityOf(options.depth);
   RequireEngine(options.depth);
@@ -86,13 +96,16 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
                                       {"completion", options.depth.completion},
                                       {"seed", options.seed},
                                       {"workspace_sha256", InputHash(options.depth.workspace)},
+                                      {"prior", PriorJson(options.depth.prior)},
+                                      {"prior_sha256", InputHash(options.depth.prior.folder)},
                                       {"set_sha256", Sha256OfFile(options.set / "set.json")},
                                       {"held_out", HeldOutHashes(set)}};
   io::SetWriter writer(report.written, fingerprint.dump(), in_place || options.force);
   CopyImages(options.set, set, options.threads, writer, progress);
-  const stereo::QualitySettings spent =
+  const DepthStageResult stage =
       DepthStage(set, sparse, options.depth, quality,
                  {options.threads, options.seed, options.normals}, writer, progress);
+  report.prior = stage.prior;
   // What was left out of the former depth says nothing of this.
   if (!io::PrunedJson(set).empty()) {
     progress.Note("the record of what was pruned goes with the depth that was pruned");
@@ -116,7 +129,11 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
   for (const char* old : {"neighbours", "round_neighbours", "iterations", "rounds"}) {
     recorded.erase(old);
   }
-  recorded.update(SettingsJson(options.depth.engine, spent));
+  recorded.update(SettingsJson(options.depth.engine, stage.quality));
+  recorded.erase("depth_prior");
+  provenance.erase("depth_prior");
+  if (options.depth.prior.given()) recorded["depth_prior"] = PriorJson(options.depth.prior);
+  if (stage.prior) provenance["depth_prior"] = JsonOf(*stage.prior);
   recorded["seed"] = options.seed;
   recorded["completion"] = options.depth.completion;
   recorded.erase("depth_error_px");
@@ -135,6 +152,7 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
                 .engine = options.depth.engine,
                 .checks = validation.tests,
                 .skipped = {},
+                .prior = report.prior,
                 .threads = options.threads},
                progress);
   log.End();

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "dtr/base/parallel_for.h"
+#include "stereo/prior_use.h"
 
 namespace dtr::stereo {
 namespace {
@@ -59,6 +60,22 @@ struct Checker {
   }
 };
 
+/// The view's prior, which has seen the surface too.
+class Instrument {
+ public:
+  explicit Instrument(const DepthPrior& prior) : noise_(prior.noise), planes_(prior.load()) {}
+
+  bool Confirms(const Eigen::Vector2d& share, double z) const {
+    const auto plane = planes_.At(share);
+    if (!plane || plane->at_edge) return false;
+    return std::abs(z * plane->inverse_depth - 1) <= kPriorSigmas * noise_.At(z);
+  }
+
+ private:
+  RelativeNoise noise_;
+  PriorPlanes planes_;
+};
+
 }  // namespace
 
 DepthEstimate FilterByConsistency(const StereoView& view, const DepthEstimate& estimate,
@@ -73,13 +90,17 @@ DepthEstimate FilterByConsistency(const StereoView& view, const DepthEstimate& e
     checkers.push_back({&other, other.view->cam_from_world * view.cam_from_world.Inverse(),
                         other.view->camera.fx_px() * baseline});
   }
+  const std::optional<Instrument> instrument =
+      view.prior != nullptr ? std::optional<Instrument>(*view.prior) : std::nullopt;
   DepthEstimate result = estimate;
   ParallelFor(0, estimate.depth.height(), threads, [&](int y) {
     for (int x = 0; x < estimate.depth.width(); ++x) {
       const float z = estimate.depth(x, y);
       if (DepthImage::IsHole(z)) continue;
       const Eigen::Vector3d p = view.camera.CamFromPixel({x + 0.5, y + 0.5}, z, DepthKind::kPlaneZ);
-      int confirming = 0, refuting = 0;
+      const Eigen::Vector2d share((x + 0.5) / estimate.depth.width(),
+                                  (y + 0.5) / estimate.depth.height());
+      int confirming = instrument && instrument->Confirms(share, z) ? 1 : 0, refuting = 0;
       for (const Checker& checker : checkers) {
         const int vote = checker.Vote(p, options.tolerance_px);
         confirming += vote > 0;

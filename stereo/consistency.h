@@ -22,6 +22,7 @@ struct OtherDepth {
 /// (inverse depth interpolated within one surface), the difference in pixels of disparity is
 /// fx' |c - c'| |1/z' - 1/z''|. Within the tolerance the map confirms; a map surface that lies
 /// farther refutes (its view looks through the point); a nearer one hides it and says nothing.
+/// A prior of the view confirms what lies within 2.5 standard deviations of it, off its edges.
 /// The sigma of a pixel that is kept although c maps confirm and r > 0 refute it grows by
 /// exp(5 r / (c + r + 1)): it is more likely to be wrong.
 /// Only the unfiltered inputs are read, so the order in which views are filtered has no influence.

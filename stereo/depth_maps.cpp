@@ -7,6 +7,7 @@
 
 #include "dtr/base/parallel_for.h"
 #include "stereo/left_out.h"
+#include "stereo/prior_use.h"
 #include "stereo/rounds.h"
 #include "stereo/widen.h"
 
@@ -192,8 +193,9 @@ class Run {
       others.push_back({&views_[static_cast<size_t>(n)], held.back().get()});
     }
     // What makes room here also leaves it for writing the result.
-    const Pages::Reservation result(
-        pages_, kResultCopies * EstimateBytes(views_[static_cast<size_t>(view)].camera));
+    const StereoView& of = views_[static_cast<size_t>(view)];
+    const Pages::Reservation result(pages_, kResultCopies * EstimateBytes(of.camera) +
+                                                (of.prior != nullptr ? PriorBytes(of.camera) : 0));
     return FilterByConsistency(views_[static_cast<size_t>(view)], *own, others,
                                options_.consistency, options_.engine.threads);
   }

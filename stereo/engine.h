@@ -11,6 +11,7 @@
 #include "dtr/types/depth_image.h"
 #include "dtr/types/grid.h"
 #include "dtr/types/pose.h"
+#include "stereo/depth_prior.h"
 #include "stereo/plane_map.h"
 
 namespace dtr::stereo {
@@ -19,8 +20,9 @@ namespace dtr::stereo {
 struct StereoView {
   PinholeCamera camera{1, 1, 1, 1, 0, 0};
   Pose cam_from_world;
-  const ImageRgb8* image = nullptr;  ///< 8-bit sRGB, size of `camera`
-  const Mask* mask = nullptr;        ///< null or empty: every pixel is usable
+  const ImageRgb8* image = nullptr;   ///< 8-bit sRGB, size of `camera`
+  const Mask* mask = nullptr;         ///< null or empty: every pixel is usable
+  const DepthPrior* prior = nullptr;  ///< null: nothing is known of its depth
 };
 
 /// Depths to search in the reference view, plane z in scene units, 0 < near_z < far_z.

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "stereo/prior_use.h"
+
 namespace dtr::stereo {
 namespace {
 
@@ -78,8 +80,10 @@ std::uint64_t LeastBytes(std::span<const StereoView> views, const Engine& engine
   constexpr std::uint64_t kMore = Pages::kLoadingCopies - 1;
   const std::uint64_t loading = pixels + planes + kMore * largest_page;
   const std::uint64_t working = pixels + planes + engine.WorkBytes(views, view, neighbours);
+  const std::uint64_t prior =
+      filters && views[static_cast<size_t>(view)].prior != nullptr ? PriorBytes(camera) : 0;
   const std::uint64_t filtering =
-      estimates + std::max(kMore * largest_page, kResultCopies * EstimateBytes(camera));
+      estimates + std::max(kMore * largest_page, kResultCopies * EstimateBytes(camera)) + prior;
   return std::max({loading, working, filtering});
 }
 

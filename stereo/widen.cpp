@@ -89,7 +89,7 @@ std::vector<DepthRange> Widened(const Collection& c, int most, Progress& progres
   std::vector<StereoView> views;
   for (size_t v = 0; v < small.size(); ++v) {
     views.push_back({small[v].camera, c.views[v].cam_from_world, &small[v].pixels.image,
-                     &small[v].pixels.mask});
+                     &small[v].pixels.mask, c.views[v].prior});
   }
   EngineOptions options = c.options;
   options.look = true;

@@ -58,7 +58,7 @@ void AddBuildCommand(CLI::App& app) {
         command.add_flag("--holdout-strict", options->holdout_strict,
                          "Keep them out of SfM too and register them afterwards");
         AddDepthOptions(
-            command, {"sgbm", "patchmatch", "colmap", "none"},
+            command, {"sgbm", "patchmatch", "colmap", "prior", "none"},
             "Long side 800, 1024 or full size, and work spent on depth and, with fast, on "
             "cameras (--features 4096) [balanced]",
             options->depth);

@@ -47,7 +47,8 @@ struct MakeOptions {
 
 void DeclareMakeOptions(CLI::App& command, MakeOptions& options) {
   datasets::DatasetSpec& spec = options.spec;
-  command.add_option("NAME", spec.scene, "Scene: courtyard, plane, stairs, sphere or room")
+  command
+      .add_option("NAME", spec.scene, "Scene: courtyard, plane, stairs, sphere, room or plain-room")
       ->required();
   command.add_option("-o,--output", options.output, "Folder to write")
       ->required()

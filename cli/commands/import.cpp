@@ -58,8 +58,9 @@ void AddImportCommand(CLI::App& app) {
             ->type_name("FILE");
         command.add_option("--format", options->format, "Format of --cameras [by its content]")
             ->check(CLI::IsMember(pipeline::CameraFormats()));
-        command.add_option("--images", options->images, "Folder of the images")
-            ->required()
+        command
+            .add_option("--images", options->images,
+                        "Folder of the images; a capture knows its own")
             ->type_name("DIR");
         CLI::Option* depth =
             command

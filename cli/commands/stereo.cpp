@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 
 #include "cli/command.h"
 #include "cli/depth_options.h"
@@ -20,7 +19,7 @@ void AddStereoCommand(CLI::App& app) {
             .add_option("-o,--output", options->output,
                         "The set to write; without it SET itself is replaced, whole or not at all")
             ->type_name("SET2");
-        AddDepthOptions(command, {"sgbm", "patchmatch", "colmap"},
+        AddDepthOptions(command, {"sgbm", "patchmatch", "colmap", "prior"},
                         "Work spent on a depth map; the images keep their size [balanced]",
                         options->depth);
         command
@@ -37,10 +36,7 @@ void AddStereoCommand(CLI::App& app) {
           context.console.Say(fmt::format("{}: {} depth maps, {:.1f} % of the pixels have depth",
                                           report.written.string(), report.depth_maps,
                                           100 * report.depth_completeness));
-          const nlohmann::ordered_json json = {{"set", report.written.string()},
-                                               {"depth_maps", report.depth_maps},
-                                               {"depth_completeness", report.depth_completeness}};
-          context.EmitJson(json.dump(1));
+          context.EmitJson(pipeline::ToJson(report));
           return kDone;
         };
       });

@@ -20,8 +20,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace dtr::stereo::patchmatch::HWY_NAMESPACE {
 
-/// Candidates per visit: the pixel's own plane, 4 near and 4 far regions, 2 guesses.
-constexpr int kPlanes = 11;
+/// Candidates per visit: the pixel's own plane, 4 near and 4 far regions, 3 guesses.
+constexpr int kPlanes = 12;
 /// A view sees a pixel when more than this many candidates match well in it and fewer than that
 /// badly. ACMH's 2 and 3 take the observation from all views next to silhouettes and behind thin
 /// things.
@@ -112,7 +112,21 @@ void AddRegion(const State& state, const Group& g, int fx, int fy, bool far_stri
   hn::Store(b, d, candidates->b[n]);
 }
 
-void CollectCandidates(const State& state, const Group& g, int far_regions, Candidates* c) {
+/// Adds the plane that something suggests, to the lanes that have one.
+void AddSuggested(const BorderedGrid& of_w, const BorderedGrid& of_a, const BorderedGrid& of_b,
+                  const Group& g, Candidates* c) {
+  const DF d;
+  const VF w = LoadColour(of_w, g.x, g.y);
+  const auto given = hn::Gt(w, hn::Zero(d));
+  if (hn::AllFalse(d, given)) return;
+  const int n = c->count++;
+  hn::Store(hn::IfThenElse(given, w, hn::Set(d, kNothing)), d, c->w[n]);
+  hn::Store(LoadColour(of_a, g.x, g.y), d, c->a[n]);
+  hn::Store(LoadColour(of_b, g.x, g.y), d, c->b[n]);
+}
+
+void CollectCandidates(const Level& level, const State& state, const Group& g, int far_regions,
+                       Candidates* c) {
   const DF d;
   c->count = 1;
   hn::Store(LoadColour(state.w, g.x, g.y), d, c->w[0]);
@@ -124,13 +138,10 @@ void CollectCandidates(const State& state, const Group& g, int far_regions, Cand
     AddRegion(state, g, kDirections[i][0], kDirections[i][1], true, c);
   }
   for (const State::Hypothesis& hypothesis : state.hypotheses) {
-    const VF w = LoadColour(hypothesis.w, g.x, g.y);
-    const auto given = hn::Gt(w, hn::Zero(d));
-    if (hn::AllFalse(d, given)) continue;
-    const int n = c->count++;
-    hn::Store(hn::IfThenElse(given, w, hn::Set(d, kNothing)), d, c->w[n]);
-    hn::Store(LoadColour(hypothesis.a, g.x, g.y), d, c->a[n]);
-    hn::Store(LoadColour(hypothesis.b, g.x, g.y), d, c->b[n]);
+    AddSuggested(hypothesis.w, hypothesis.a, hypothesis.b, g, c);
+  }
+  if (const auto& expected = level.expected) {
+    AddSuggested(expected->w, expected->a, expected->b, g, c);
   }
 }
 
@@ -249,12 +260,27 @@ VF TotalCost(const Level& level, const Group& g, const Best& best, VF w, VF a, V
   return total;
 }
 
+/// Cost of missing the expected depth: the negative logarithm of a normal distribution over a
+/// constant, bounded, so that photos that contradict what is expected win (Welsch's loss; Xu and
+/// Tao, AAAI 2020, eq. 6, have the same mixture for planes between matched points).
+VF Unexpected(const Level& level, const Group& g, VF w) {
+  const DF d;
+  if (!level.expected) return hn::Zero(d);
+  const VF off = hn::Mul(hn::Sub(w, LoadColour(level.expected->w, g.x, g.y)),
+                         LoadColour(level.expected->inverse_sigma, g.x, g.y));
+  const VF likely = hn::Exp(d, hn::Mul(hn::Set(d, -0.5f), hn::Mul(off, off)));
+  const VF weak = hn::Set(d, kWeakTexture);
+  const VF most =
+      hn::Div(hn::Mul(hn::Set(d, kUnexpectedCost), weak), hn::Add(weak, hn::Load(d, g.texture)));
+  return hn::Mul(most, hn::Sub(hn::Set(d, 1.0f), likely));
+}
+
 /// Takes a plane, put into the range, where it costs less.
 void TryPlane(const Level& level, const Group& g, VF w, VF a, VF b, Best* best) {
   const DF d;
   w = hn::Min(hn::Max(w, hn::Set(d, level.w_min)), hn::Set(d, level.w_max));
   const VF limit = hn::Load(d, best->cost);
-  const VF cost = TotalCost(level, g, *best, w, a, b, limit);
+  const VF cost = hn::Add(TotalCost(level, g, *best, w, a, b, limit), Unexpected(level, g, w));
   const auto less = hn::Lt(cost, limit);
   hn::Store(hn::IfThenElse(less, cost, limit), d, best->cost);
   hn::Store(hn::IfThenElse(less, w, hn::Load(d, best->w)), d, best->w);
@@ -275,6 +301,7 @@ void ChooseJointly(const Level& level, const Sweep& sweep, const State& state, c
       const VF part = hn::Mul(weight, hn::Load(d, c->cost[n][v]));
       total = hn::Add(total, hn::IfThenZeroElse(hn::Eq(weight, hn::Zero(d)), part));
     }
+    total = hn::Add(total, Unexpected(level, g, hn::Load(d, c->w[n])));
     const VF old = hn::Load(d, best->cost);
     const auto less = hn::Lt(total, old);
     hn::Store(hn::IfThenElse(less, total, old), d, best->cost);
@@ -340,7 +367,7 @@ std::int64_t SweepRowImpl(const Level& level, const Sweep& sweep, int y, State* 
   Group g;
   for (int x = (y + sweep.colour) % 2; x < width; x += 2 * static_cast<int>(kLanes)) {
     PrepareGroup(level, x, y, &g);
-    CollectCandidates(*state, g, sweep.far_regions, &candidates);
+    CollectCandidates(level, *state, g, sweep.far_regions, &candidates);
     ChooseJointly(level, sweep, *state, g, &candidates, &best);
     Refine(level, sweep, *state, g, &best);
     StoreColour(hn::Load(d, best.w), x, y, width, &state->w);
@@ -416,7 +443,8 @@ std::int64_t SearchRowImpl(const Level& level, int samples, int y, State* state)
         first = hn::Min(first, cost);
       }
       const VF mean = views == 1 ? first : hn::Mul(half, hn::Add(first, second));
-      const VF cost = hn::Min(mean, hn::Add(first, hn::Set(d, kLoneView)));
+      const VF cost =
+          hn::Add(hn::Min(mean, hn::Add(first, hn::Set(d, kLoneView))), Unexpected(level, g, w));
       const auto less = hn::Lt(cost, best);
       best = hn::IfThenElse(less, cost, best);
       best_w = hn::IfThenElse(less, w, best_w);

@@ -6,6 +6,7 @@
 // (homogeneous), m = K' R K^-1 and k = K' t, so a plane's homography needs no inverse.
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -29,6 +30,11 @@ constexpr int kTextureBorder = 16;
 constexpr int kWidestTexture = 32767 - 2 * kTextureBorder;
 /// Worst cost (NCC = -1); also of a window that does not fit into a view.
 constexpr float kWorstCost = 2.0f;
+/// What a plane costs more, at most, for missing the expected depth where a window has no texture:
+/// enough to outweigh its chance minima. Where the texture has this variance (grey levels squared)
+/// half of it, and less the more the photos show: a constant of 0.3 pulled textured surfaces by a
+/// pixel to a depth that was wrong by 10 % (prior_test, PhotosThatContradictAPriorWin).
+constexpr float kUnexpectedCost = 0.5f, kWeakTexture = 3.0f;
 
 /// A grid with `kBorder` extra pixels on every side, addressed from -kBorder on.
 template <typename T>
@@ -88,10 +94,17 @@ struct State {
   std::vector<Hypothesis> hypotheses;
 };
 
+/// Inverse depth that another instrument measured at the pixels: planes, and one over the standard
+/// deviation, 0 where nothing is known.
+struct Expected {
+  BorderedGrid w, a, b, inverse_sigma;
+};
+
 /// One level: what is matched. Inverse depths are in units in which the range's near end is 1.
 struct Level {
   Reference reference;
   std::vector<Source> sources;
+  std::optional<Expected> expected;
   float w_min = 0, w_max = 1;
   std::uint64_t seed = 0;
 };

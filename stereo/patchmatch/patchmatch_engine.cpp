@@ -2,13 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <optional>
 #include <stdexcept>
 
 #include "dtr/base/parallel_for.h"
 #include "dtr/base/random.h"
+#include "stereo/patchmatch/expected.h"
 #include "stereo/patchmatch/hypotheses.h"
 #include "stereo/patchmatch/level.h"
 #include "stereo/patchmatch/trust.h"
+#include "stereo/prior_use.h"
 
 namespace dtr::stereo {
 namespace {
@@ -36,6 +40,8 @@ constexpr double kSmallestDisparityPx = 0.5;
 /// hand out; a depth map with what evaluating it takes; a neighbour's textures with all halvings.
 constexpr double kReferenceBytes = 12, kStateBytes = 16, kWeightBytes = 4, kGuessBytes = 28,
                  kImageBytes = 7, kPlaneBytes = 12, kEstimateBytes = 54, kSourceBytes = 7;
+/// What a prior takes at the reference's pixels, of two levels in the search, beside PriorBytes.
+constexpr double kExpectedBytes = 16;
 constexpr double kSmallThingsBytes = 1 << 18;
 
 void CheckRequest(std::span<const StereoView> views, int reference, std::span<const int> neighbours,
@@ -115,16 +121,18 @@ void RunSweeps(const Level& level, Sweep sweep, int iterations, float step_px, i
   }
 }
 
-/// Planes of the finest level.
+/// Planes of the finest level. `expect` sets what a level's pixels are expected to show.
 State SearchPyramid(const StereoView& view, std::span<const GreyImage> pictures,
                     std::span<const SourcePyramid> sources, const DepthRange& range, int iterations,
-                    const EngineOptions& options, Level* finest) {
+                    const EngineOptions& options, const std::function<void(Level*)>& expect,
+                    Level* finest) {
   State state;
   Level level, coarser;
   int round = 0;
   for (size_t index = pictures.size(); index-- > 0; coarser = std::move(level)) {
     const std::uint64_t seed = HashOf(options.seed, index);
     level = MakeLevel(view, pictures[index], sources, index, range, seed);
+    expect(&level);
     const bool coarsest = index + 1 == pictures.size();
     if (coarsest) {
       double range_px = 0;
@@ -163,14 +171,22 @@ struct Problem {
     pictures = Pyramid(MakeGreyImage(*view), levels);
     sources = MakeSources(views, reference, neighbours, range, maps, max_sources, levels,
                           options.threads);
+    if (view->prior != nullptr) prior.emplace(view->prior->load());
+  }
+
+  void Expect(Level* level, int threads) const {
+    if (prior) level->expected = ExpectedOf(*level, *prior, view->prior->noise, range, threads);
   }
 
   State Search(int iterations, const EngineOptions& options) {
-    return SearchPyramid(*view, pictures, sources, range, iterations, options, &finest);
+    return SearchPyramid(
+        *view, pictures, sources, range, iterations, options,
+        [&](Level* level) { Expect(level, options.threads); }, &finest);
   }
 
   State Resume(const PlaneMap& map, const EngineOptions& options) {
     finest = MakeLevel(*view, pictures[0], sources, 0, range, HashOf(options.seed, 0));
+    Expect(&finest, options.threads);
     return StateOf(finest, map, range);
   }
 
@@ -178,6 +194,7 @@ struct Problem {
   DepthRange range;
   std::vector<GreyImage> pictures;
   std::vector<SourcePyramid> sources;
+  std::optional<PriorPlanes> prior;
   Level finest;
 };
 
@@ -206,13 +223,16 @@ std::uint64_t PatchMatchEngine::WorkBytes(std::span<const StereoView> views, int
   const PinholeCamera& camera = views[static_cast<size_t>(reference)].camera;
   const double w = camera.width_px(), h = camera.height_px();
   const size_t sources = std::min<size_t>(neighbours.size(), static_cast<size_t>(Neighbours()));
-  const double state = kReferenceBytes + kStateBytes + kWeightBytes * static_cast<double>(sources);
+  const bool has_prior = views[static_cast<size_t>(reference)].prior != nullptr;
+  const double state = kReferenceBytes + kStateBytes + kWeightBytes * static_cast<double>(sources) +
+                       (has_prior ? kExpectedBytes : 0);
   const double search = area(w, h, kBorder) * state + std::max(area(w / 2, h / 2, kBorder) * state,
                                                                area(w, h, 0) * kEstimateBytes);
   const double round = quality_.rounds == 0 ? 0
                                             : area(w, h, kBorder) * (state + kGuessBytes) +
                                                   area(w, h, 0) * kPlaneBytes;
   double bytes = kSmallThingsBytes + std::max(search, round) + area(w, h, 0) * kImageBytes;
+  if (has_prior) bytes += static_cast<double>(PriorBytes(camera));
   for (size_t i = 0; i < sources; ++i) {
     const PinholeCamera& c = views[static_cast<size_t>(neighbours[i])].camera;
     bytes += kSourceBytes * area(c.width_px(), c.height_px(), kTextureBorder);

@@ -8,6 +8,7 @@
 #include "dtr/base/parallel_for.h"
 #include "stereo/patchmatch/planar_prior.h"
 #include "stereo/patchmatch/speckles.h"
+#include "stereo/prior_use.h"
 
 namespace dtr::stereo::patchmatch {
 namespace {
@@ -55,6 +56,8 @@ constexpr float kOddsPerLogSigma = 0.44f, kMinSigmaPx = 0.02f;
 /// What a wrong depth adds to sigma, pixels of disparity. Wrong depths are wrong by tens of pixels;
 /// as much as that would make the right ones that look like them, which are more, too modest.
 constexpr float kWrongByPx = 2.5f;
+
+constexpr auto kExpectedSigmas = static_cast<float>(kPriorSigmas);
 
 /// How likely the depth is wrong, from 0 to 1.
 float ProbabilityOfWrong(const PixelEstimate& v) {
@@ -179,6 +182,35 @@ class Trust {
     return true;
   }
 
+  /// Where another instrument has measured depth: gives it to pixels that the photos leave
+  /// undecided, and makes vague depths that agree with it surer. Depths that contradict it stay.
+  void AskTheInstrument() {
+    if (!level_.expected) return;
+    ParallelFor(0, height(), threads_, [&](int y) {
+      std::vector<float> vague(static_cast<size_t>(width()), 0);
+      for (int x = 0; x < width(); ++x) {
+        const float certainty = *level_.expected->inverse_sigma.at(x, y);
+        if (!(certainty > 0) || !(px_per_w_(x, y) > 0)) continue;
+        if (DepthImage::IsHole(result_.depth(x, y))) {
+          TakeExpected(x, y, 1 / certainty);
+        } else if (sigma_px_(x, y) > kVaguePx) {
+          vague[static_cast<size_t>(x)] = 1;
+        }
+      }
+      std::vector<PixelEstimate> row(static_cast<size_t>(width()));
+      EstimateRow(level_, *state_, y, vague.data(), row.data());
+      for (int x = 0; x < width(); ++x) {
+        if (vague[static_cast<size_t>(x)] == 0) continue;
+        PixelEstimate& v = row[static_cast<size_t>(x)];
+        const float w = *level_.expected->w.at(x, y);
+        const float sigma = 1 / *level_.expected->inverse_sigma.at(x, y);
+        if (std::abs(v.w - w) > kExpectedSigmas * std::hypot(v.sigma, sigma)) continue;
+        Combine(w, sigma, &v);
+        Keep(x, y, v);
+      }
+    });
+  }
+
   DepthEstimate TakeResult() { return std::move(result_); }
 
  private:
@@ -194,6 +226,22 @@ class Trust {
     result_.depth(x, y) = static_cast<float>(near_z_ / static_cast<double>(believed_(x, y)));
     result_.inverse_depth_sigma(x, y) =
         static_cast<float>(static_cast<double>(SigmaWithDoubt(v)) / near_z_);
+  }
+
+  /// The plane of the state where it is one that is expected: the passes have made it agree with
+  /// those of other views. Else the expected plane itself.
+  void TakeExpected(int x, int y, float sigma) {
+    const Expected& expected = *level_.expected;
+    float& w = *state_->w.at(x, y);
+    if (std::abs(w - *expected.w.at(x, y)) > kExpectedSigmas * sigma) {
+      w = *expected.w.at(x, y);
+      *state_->a.at(x, y) = *expected.a.at(x, y);
+      *state_->b.at(x, y) = *expected.b.at(x, y);
+    }
+    believed_(x, y) = w;
+    sigma_px_(x, y) = sigma * px_per_w_(x, y);
+    result_.depth(x, y) = static_cast<float>(near_z_ / static_cast<double>(w));
+    result_.inverse_depth_sigma(x, y) = static_cast<float>(static_cast<double>(sigma) / near_z_);
   }
 
   const Level& level_;
@@ -214,6 +262,7 @@ DepthEstimate TrustedDepth(const Level& level, const StereoView& view, const Dep
                            int threads, State* state, bool* planes_left_out) {
   Trust trust(level, view, range, threads, state);
   trust.BelieveWhatIsSeen();
+  trust.AskTheInstrument();
   int passes = 0;
   while (passes < kPriorPasses && trust.AskThePlanesAround()) ++passes;
   *planes_left_out = passes == 0;

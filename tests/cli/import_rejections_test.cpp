@@ -26,6 +26,7 @@ TEST_F(Rejections, WhatCannotBeImported) {
       {kWrongUsage,
        "not recognised; what can be read (its --format): the folder of a COLMAP model (colmap)",
        import(Write("cameras.xml", ""), {"--images", Photos()})},
+      {kWrongUsage, "--images: expected the folder of the images of", import(good, {})},
       {kWrongUsage, ": no such folder",
        import(good, {"--images", Photos(), "--masks", In("masks")})},
       {kWrongUsage, "expected a mask of 0000.jpg or of another photo, called 0000.png",

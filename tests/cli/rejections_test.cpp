@@ -15,7 +15,7 @@ TEST_F(Rejections, WhatIsNoDataSet) {
     return further;
   };
   ExpectAllRejected({
-      {kWrongUsage, "scene: expected courtyard, plane, stairs, sphere or room, found 'park'",
+      {kWrongUsage, "scene: expected courtyard, plane, stairs, sphere, room or plain-room, found 'park'",
        make("park", {})},
       {kWrongUsage, "for scene 'plane', found 'circle'", make("plane", {"--layout", "circle"})},
       {kWrongUsage, "views: expected 2 to", make("plane", {"--views", "1"})},

@@ -8,8 +8,10 @@
 #include "dtr/io/formats/llff.h"
 #include "dtr/io/formats/npy.h"
 #include "dtr/io/formats/pfm.h"
+#include "dtr/io/formats/rgbd_capture.h"
 #include "dtr/io/formats/text_cameras.h"
 #include "dtr/io/formats/transforms_json.h"
+#include "dtr/io/image_io.h"
 #include "tests/fuzz/readers.h"
 
 namespace dtr::fuzz {
@@ -132,9 +134,102 @@ Reader OpenMatrixText(const fs::path& folder) {
           }};
 }
 
+// A capture of a phone or depth camera, of which one file is bad.
+Reader OpenCapture(const fs::path& folder, const std::string& format, const std::string& photo,
+                   const std::string& file, std::vector<std::string> seeds,
+                   const std::vector<std::pair<std::string, std::string>>& others) {
+  fs::create_directories((folder / photo).parent_path());
+  io::WriteImage(folder / photo, ImageRgb8(64, 48, 3, 90));
+  for (const auto& [name, text] : others) {
+    fs::create_directories((folder / name).parent_path());
+    WriteFileAtomically(folder / name, text);
+  }
+  fs::create_directories((folder / file).parent_path());
+  return {folder / file, std::move(seeds), [=] { io::ReadRgbdCapture(folder, format); },
+          kImageBufferBytes};
+}
+
+constexpr char kPinhole[] = "50 0 32\n0 50 24\n0 0 1\n";
+
+Reader OpenPolycam(const fs::path& folder) {
+  return OpenCapture(
+      folder, "polycam", "keyframes/images/1.png", "keyframes/cameras/1.json",
+      {R"({"fx": 50, "fy": 50, "cx": 32, "cy": 24, "width": 64, "height": 48, "t_00": 1, "t_01": 0,
+  "t_02": 0, "t_03": 0.5, "t_10": 0, "t_11": 1, "t_12": 0, "t_13": 1, "t_20": 0, "t_21": 0, "t_22": 1,
+  "t_23": 2})"},
+      {});
+}
+Reader OpenRecord3d(const fs::path& folder) {
+  return OpenCapture(folder, "record3d", "rgb/0.png", "metadata.json",
+                     {R"({"w": 64, "h": 48, "K": [50, 0, 0, 0, 50, 0, 32, 24, 1],
+  "poses": [[0, 0, 0, 1, 1, 2, 3]], "perFrameIntrinsicCoeffs": [[50, 50, 32, 24]]})"},
+                     {});
+}
+Reader OpenOdometry(const fs::path& folder) {
+  return OpenCapture(
+      folder, "stray-scanner", "rgb/000000.png", "odometry.csv",
+      {"timestamp, frame, x, y, z, qx, qy, qz, qw\n0.5, 000000, 1, 2, 3, 0, 0, 0, 1\n"},
+      {{"camera_matrix.csv", "50,0,32\n0,50,24\n0,0,1\n"}});
+}
+Reader OpenCameraMatrix(const fs::path& folder) {
+  return OpenCapture(
+      folder, "stray-scanner", "rgb/000000.png", "camera_matrix.csv", {"50,0,32\n0,50,24\n0,0,1\n"},
+      {{"odometry.csv", "timestamp,frame,x,y,z,qx,qy,qz,qw\n0,000000,1,2,3,0,0,0,1\n"}});
+}
+Reader OpenTrajectory(const fs::path& folder) {
+  return OpenCapture(folder, "arkitscenes", "lowres_wide/4_7.125.png", "lowres_wide.traj",
+                     {"7.125 0.1 0.2 0.3 1 2 3\n7.225 0.1 0.2 0.3 1 2 3\n"},
+                     {{"lowres_wide_intrinsics/4_7.125.pincam", "64 48 50 50 32 24"}});
+}
+Reader OpenPincam(const fs::path& folder) {
+  return OpenCapture(folder, "arkitscenes", "lowres_wide/4_7.125.png",
+                     "lowres_wide_intrinsics/4_7.125.pincam", {"64 48 50 50 32 24"},
+                     {{"lowres_wide.traj", "7.125 0.1 0.2 0.3 1 2 3\n"}});
+}
+Reader OpenScanNet(const fs::path& folder) {
+  const std::string matrix = "50 0 32 0\n0 50 24 0\n0 0 1 0\n0 0 0 1\n";
+  return OpenCapture(folder, "scannet", "color/0.png", "pose/0.txt",
+                     {"1 0 0 0.5\n0 1 0 1\n0 0 1 2\n0 0 0 1\n", "-inf -inf -inf -inf\n"},
+                     {{"intrinsic/intrinsic_color.txt", matrix}});
+}
+Reader OpenTum(const fs::path& folder) {
+  return OpenCapture(folder, "tum", "rgb/1.png", "groundtruth.txt",
+                     {"# pose\n0.99 1 2 3 0 0 0 1\n1.01 1 2 3 0 0 0 1\n"},
+                     {{"rgb.txt", "1 rgb/1.png\n"},
+                      {"depth.txt", "1 rgb/1.png\n"},
+                      {"camera-intrinsics.txt", kPinhole}});
+}
+Reader OpenTimes(const fs::path& folder) {
+  return OpenCapture(folder, "tum", "rgb/1.png", "rgb.txt", {"# times\n1 rgb/1.png\n2 rgb/2.png\n"},
+                     {{"groundtruth.txt", "0.99 1 2 3 0 0 0 1\n1.01 1 2 3 0 0 0 1\n"},
+                      {"camera-intrinsics.txt", kPinhole}});
+}
+Reader OpenOpen3d(const fs::path& folder) {
+  return OpenCapture(
+      folder, "open3d", "color/00000.png", "camera_intrinsic.json",
+      {R"({"width": 64, "height": 48, "intrinsic_matrix": [50, 0, 0, 0, 50, 0, 32, 24, 1]})"},
+      {{"depth/note.txt", ""}, {"a.log", "0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"}});
+}
+
 constexpr ReaderKind kReaders[] = {
-    {"npy", OpenNpy}, {"llff", OpenLlff},       {"pfm", OpenPfm}, {"transforms", OpenTransforms},
-    {"par", OpenPar}, {"strecha", OpenStrecha}, {"log", OpenLog}, {"matrix-text", OpenMatrixText},
+    {"npy", OpenNpy},
+    {"llff", OpenLlff},
+    {"pfm", OpenPfm},
+    {"transforms", OpenTransforms},
+    {"par", OpenPar},
+    {"strecha", OpenStrecha},
+    {"log", OpenLog},
+    {"matrix-text", OpenMatrixText},
+    {"polycam", OpenPolycam},
+    {"record3d", OpenRecord3d},
+    {"odometry", OpenOdometry},
+    {"camera-matrix", OpenCameraMatrix},
+    {"trajectory", OpenTrajectory},
+    {"pincam", OpenPincam},
+    {"scannet", OpenScanNet},
+    {"tum", OpenTum},
+    {"times", OpenTimes},
+    {"open3d", OpenOpen3d},
 };
 
 }  // namespace

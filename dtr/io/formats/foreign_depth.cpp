@@ -17,10 +17,14 @@
 namespace dtr::io {
 namespace {
 
+/// What depth cameras write where they have measured nothing, or more than 16 bits can hold.
+constexpr std::uint16_t kNoReading = 65535;
+
 Grid<float> FloatsFromPng16(const std::filesystem::path& file, std::uint64_t limit_px) {
   const Grid<std::uint16_t> codes = ReadPng16(file, limit_px);
   Grid<float> numbers(codes.width(), codes.height());
-  std::copy(codes.data().begin(), codes.data().end(), numbers.data().begin());
+  std::transform(codes.data().begin(), codes.data().end(), numbers.data().begin(),
+                 [](std::uint16_t code) { return code == kNoReading ? 0.0f : code; });
   return numbers;
 }
 

@@ -11,7 +11,8 @@ namespace dtr::io {
 /// channel of 16 bits) or .npy (one image of floats or integers: HxW, 1xHxW or HxWx1).
 /// Each number is multiplied by `unit_scale` to give scene units (0.001 for millimetres in a set in
 /// metres) and measures what `kind` says; nothing guesses either. Numbers that are zero, negative,
-/// NaN or infinite, before or after scaling, are holes (programs write 0, -1, NaN or infinity).
+/// NaN or infinite, before or after scaling, are holes (programs write 0, -1, NaN or infinity), as
+/// is 65535 of 16 bits.
 /// The map must be width_px x height_px or 1/s of it per axis with one whole s; its pixel (i, j)
 /// then belongs to the image around s (i + 0.5), s (j + 0.5).
 /// Throws Error for another size (checked before any pixel is read), a damaged file or another

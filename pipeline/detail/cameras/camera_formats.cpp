@@ -8,6 +8,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/lower_case.h"
 #include "dtr/io/formats/foreign_readers.h"
+#include "dtr/io/formats/rgbd_capture.h"
 #include "pipeline/detail/photos/named_files.h"
 #include "pipeline/import.h"
 
@@ -95,6 +96,11 @@ bool LooksCamerasJson(const fs::path&, const FileLook& look) {
          !look.Has("board");
 }
 
+template <size_t kLayout>
+bool LooksCapture(const fs::path& file, const FileLook&) {
+  return io::RgbdFormatOf(file) == io::RgbdFormats()[kLayout];
+}
+
 constexpr CameraFormat kFormats[] = {
     {"colmap", "the folder of a COLMAP model", LooksColmap, nullptr},
     {"nerf", "a transforms.json (NeRF, instant-ngp, nerfstudio)", LooksNerf, nullptr},
@@ -110,6 +116,15 @@ constexpr CameraFormat kFormats[] = {
     {"mvsnet", "a folder with MVSNet's cams", LooksMvsnet, io::ReadMvsnetFolder},
     {"miv", "the JSON of an MPEG immersive video sequence", LooksMiv, io::ReadMivJson},
     {"cameras-json", "a cameras.json", LooksCamerasJson, nullptr},
+    // Captures, in the order of io::RgbdFormats().
+    {"polycam", "a capture of Polycam", LooksCapture<0>, nullptr},
+    {"record3d", "of Record3D", LooksCapture<1>, nullptr},
+    {"stray-scanner", "of Stray Scanner", LooksCapture<2>, nullptr},
+    {"arkitscenes", "of ARKitScenes", LooksCapture<3>, nullptr},
+    {"scannet", "of ScanNet", LooksCapture<4>, nullptr},
+    {"tum", "a sequence of TUM RGB-D", LooksCapture<5>, nullptr},
+    {"open3d", "of Open3D", LooksCapture<6>, nullptr},
+    {"7scenes", "of 7-Scenes", LooksCapture<7>, nullptr},
 };
 
 // What a file is that gives no cameras of photos, as a clause; empty: not known.

@@ -16,7 +16,7 @@ struct CameraFormat {
   const char* program;  ///< and file, as messages call it
   bool (*looks_so)(const std::filesystem::path& file, const io::FileLook& look);
   /// Null for formats that need to know the photos while they are read: COLMAP's, cameras.json,
-  /// transforms.json and LLFF's.
+  /// transforms.json, LLFF's and captures (io::RgbdFormats).
   io::ForeignScene (*read)(const std::filesystem::path& file);
 };
 

@@ -14,6 +14,7 @@
 #include "dtr/base/file_names.h"
 #include "dtr/io/formats/cameras_json.h"
 #include "dtr/io/formats/llff.h"
+#include "dtr/io/formats/rgbd_capture.h"
 #include "dtr/io/formats/transforms_json.h"
 #include "pipeline/detail/cameras/camera_formats.h"
 #include "pipeline/detail/cameras/foreign_cameras.h"
@@ -200,13 +201,18 @@ const io::SizedImage* PhotoMeant(const std::vector<io::SizedImage>& images, cons
   return nullptr;
 }
 
-PosesFile FromTransforms(const std::vector<io::SizedImage>& images, const capture::Capture& capture,
-                         const fs::path& poses) {
-  // Below the folder of photos: their names are what is left of their files' paths.
+// The folder of photos: their names are what is left of their files' paths.
+fs::path FolderOfPhotos(const capture::Capture& capture) {
   fs::path folder = capture.photos.empty() ? fs::path() : capture.photos.front().file.parent_path();
   for (const char c : capture.photos.empty() ? std::string() : capture.photos.front().name) {
     if (c == '/') folder = folder.parent_path();
   }
+  return folder;
+}
+
+PosesFile FromTransforms(const std::vector<io::SizedImage>& images, const capture::Capture& capture,
+                         const fs::path& poses) {
+  const fs::path folder = FolderOfPhotos(capture);
   io::TransformsPaths paths;
   paths.image_of = [&](const std::string& path) -> std::optional<io::SizedImage> {
     const io::SizedImage* photo = PhotoMeant(images, folder, path);
@@ -278,6 +284,12 @@ PosesFile ReadPoses(const capture::Capture& capture, const fs::path& poses,
   if (chosen.read != nullptr) return FromForeign(images, chosen, capture, poses);
   if (kind == "nerf") return FromTransforms(images, capture, poses);
   if (kind == "llff") return {io::ReadLlff(poses, std::move(images)).list, {}, {}};
+  if (io::IsRgbdFormat(kind)) {
+    io::RgbdCapture read = io::ReadRgbdCapture(poses, kind, FolderOfPhotos(capture));
+    PosesFile file{std::move(read.list), std::move(read.notes), {}};
+    NameAsPhotos(capture, file.list);
+    return file;
+  }
   PosesFile file{io::ReadCamerasJson(poses), {}, {}};
   NameAsPhotos(capture, file.list);
   return file;

@@ -6,6 +6,7 @@
 #include "calib/colmap/export.h"
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
+#include "pipeline/detail/depth/depth_priors.h"
 #include "stereo/colmap/colmap_engine.h"
 
 namespace dtr::pipeline {
@@ -69,6 +70,15 @@ void RequireEngine(const DepthChoice& choice) {
     throw UsageError(fmt::format("`time_budget`: picks settings of `engine` patchmatch, found {}",
                                  choice.engine));
   }
+  if (choice.prior.given() && choice.engine != "patchmatch" && choice.engine != "prior") {
+    throw UsageError(fmt::format(
+        "`depth_prior`: starts `engine` patchmatch, or is the depth with `engine` prior; "
+        "found `engine` {}",
+        choice.engine));
+  }
+  if (choice.engine == "prior" && !choice.prior.given()) {
+    throw UsageError("`engine` prior: takes the depth of `depth_prior`; give that folder");
+  }
   if (choice.engine == "colmap" && choice.workspace.empty()) colmap::RequireCuda();
 }
 
@@ -76,6 +86,7 @@ std::unique_ptr<stereo::Engine> MakeDepthEngine(const DepthChoice& choice,
                                                 const stereo::QualitySettings& quality,
                                                 const DepthSources& of, Progress& progress) {
   if (choice.engine == "none") return nullptr;
+  if (choice.engine == "prior") return MakePriorEngine();
   if (choice.engine == "colmap") return MakeColmapEngine(choice.workspace, of, progress);
   return stereo::MakeEngine(choice.engine, quality);
 }

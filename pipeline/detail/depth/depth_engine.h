@@ -24,7 +24,8 @@ struct DepthSources {
 };
 
 /// Rejects, before anything costs time, a choice that cannot be carried out on this machine:
-/// UsageError for a workspace without engine `colmap` or a time budget without `patchmatch`; Error
+/// UsageError for a workspace without engine `colmap`, a time budget without `patchmatch`, or a
+/// depth prior for another engine than `patchmatch` and `prior`, which needs one; Error
 /// when `colmap` shall compute and has no CUDA.
 void RequireEngine(const DepthChoice& choice);
 

@@ -163,16 +163,15 @@ void StoreImage(View& view, LengthUnit unit, io::SetWriter& writer) {
   view.mask = {};
 }
 
-stereo::QualitySettings DepthStage(DtrSet& set, const SparseScene& sparse,
-                                   const DepthChoice& choice, const stereo::QualitySettings& asked,
-                                   const DepthStageOptions& options, io::SetWriter& writer,
-                                   Progress& progress) {
+DepthStageResult DepthStage(DtrSet& set, const SparseScene& sparse, const DepthChoice& choice,
+                            const stereo::QualitySettings& asked, const DepthStageOptions& options,
+                            io::SetWriter& writer, Progress& progress) {
   if (choice.engine == "none") {
     progress.Note("depth left out: `engine` none");
-    return asked;
+    return {asked, std::nullopt};
   }
   std::vector<View>& views = set.frames.front().views;
-  const Sources sources(views);
+  Sources sources(views);
   const SparseScene scene = SourceScene(sparse, views, sources.indices);
   const auto view_of = [&](int source) -> View& {
     return views[static_cast<size_t>(sources.indices[static_cast<size_t>(source)])];
@@ -182,6 +181,27 @@ stereo::QualitySettings DepthStage(DtrSet& set, const SparseScene& sparse,
   depth_options.widenings = kWidenings;
   for (const int index : sources.indices) {
     depth_options.range.names.push_back(views[static_cast<size_t>(index)].name);
+  }
+  std::optional<DepthPriors> priors;
+  if (choice.prior.given()) {
+    std::vector<const View*> source_views;
+    for (const int index : sources.indices) {
+      source_views.push_back(&views[static_cast<size_t>(index)]);
+    }
+    try {
+      priors.emplace(choice.prior, source_views, sources.stereo, scene, set.unit, options.photos,
+                     progress);
+    } catch (const Interrupted&) {
+      throw;
+    } catch (const Error&) {
+      // The command that is corrected must not find this one's work in its way.
+      writer.Discard();
+      throw;
+    }
+    priors->Attach(sources.stereo);
+    depth_options.given_ranges =
+        priors->Widened(stereo::DepthRangesFromPoints(sources.stereo, scene, depth_options.range));
+    if (choice.engine == "prior") depth_options.consistency.min_agreeing = 0;
   }
   depth_options.engine.threads = options.threads;
   depth_options.engine.seed = options.seed;
@@ -226,7 +246,9 @@ stereo::QualitySettings DepthStage(DtrSet& set, const SparseScene& sparse,
   SetGains(set, scene, writer.folder(), options.threads, progress);
   for (const int index : sources.indices) normals.Deliver(views[static_cast<size_t>(index)]);
   if (const std::string codings = SayDepthCodings(views); !codings.empty()) progress.Note(codings);
-  return quality;
+  DepthStageResult result{quality, std::nullopt};
+  if (priors) result.prior = priors->report();
+  return result;
 }
 
 }  // namespace dtr::pipeline

@@ -2,12 +2,14 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 
 #include "dtr/base/progress.h"
 #include "dtr/io/set_io.h"
 #include "dtr/types/dtr_set.h"
 #include "dtr/types/sparse_scene.h"
 #include "pipeline/depth_settings.h"
+#include "pipeline/detail/depth/depth_priors.h"
 
 namespace dtr::pipeline {
 
@@ -17,6 +19,13 @@ struct DepthStageOptions {
   /// Where normals of the source views go, named as the depth maps, .exr, as stereo::NormalsOf
   /// gives them; empty: nowhere.
   std::filesystem::path normals = {};
+  PhotoCameras photos = {};  ///< of the views, for depth priors; empty: views are their own photos
+};
+
+/// What became of the depth stage.
+struct DepthStageResult {
+  stereo::QualitySettings quality;  ///< that was asked for or, with a time budget, what fitted
+  std::optional<DepthPriorReport> prior;
 };
 
 /// Writes the pixels of a view, or finds them written by an earlier, interrupted run, and frees
@@ -27,12 +36,11 @@ void StoreImage(View& view, LengthUnit unit, io::SetWriter& writer);
 /// rejected later by renderers) and writes it through `writer`, which has the views' images
 /// (StoreImage). Views finished by an earlier, interrupted run are taken from the writer. Only
 /// source views and the points they alone know reach the engine. Pixels are in memory only as long
-/// as they are worked with, within the memory chosen: UsageError when that is too little. Returns
-/// the quality settings used: `quality` or, with a time budget, what fitted into that.
-stereo::QualitySettings DepthStage(DtrSet& set, const SparseScene& sparse,
-                                   const DepthChoice& choice,
-                                   const stereo::QualitySettings& quality,
-                                   const DepthStageOptions& options, io::SetWriter& writer,
-                                   Progress& progress);
+/// as they are worked with, within the memory chosen: UsageError when that is too little. Throws as
+/// DepthPriors does.
+DepthStageResult DepthStage(DtrSet& set, const SparseScene& sparse, const DepthChoice& choice,
+                            const stereo::QualitySettings& quality,
+                            const DepthStageOptions& options, io::SetWriter& writer,
+                            Progress& progress);
 
 }  // namespace dtr::pipeline

@@ -12,10 +12,12 @@
 #include "dtr/base/error.h"
 #include "dtr/base/file_names.h"
 #include "dtr/io/formats/llff.h"
+#include "dtr/io/formats/rgbd_capture.h"
 #include "dtr/io/formats/transforms_json.h"
 #include "dtr/io/image_io.h"
 #include "pipeline/detail/cameras/camera_formats.h"
 #include "pipeline/detail/cameras/foreign_cameras.h"
+#include "pipeline/detail/import/rgbd_files.h"
 #include "pipeline/detail/photos/holdout.h"
 #include "pipeline/detail/photos/named_files.h"
 #include "pipeline/import.h"
@@ -219,6 +221,7 @@ CamerasFromFile ReadCameraFile(const fs::path& file, const std::string& format,
   const std::string kind = chosen.name;
   if (chosen.read != nullptr) return FromForeign(file, chosen, folders);
   if (kind == "colmap") return FromColmap(file, folders);
+  if (io::IsRgbdFormat(kind)) return FromRgbdCapture(file, kind, folders);
   if (kind == "nerf") return FromTransforms(file, folders);
   if (kind == "llff") {
     CamerasFromFile cameras;

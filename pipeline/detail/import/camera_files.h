@@ -17,6 +17,8 @@ struct CamerasFromFile {
   std::optional<SparseScene> points = {};  ///< views are indices into `list`
   /// Where masks that the file names lie; empty: `masks` beside the images.
   std::filesystem::path mask_dir = {};
+  /// Where images and depth maps of a capture lie; empty: the request says.
+  std::filesystem::path images_dir = {}, depth_dir = {};
   /// Photos that the file says are for measuring; empty: it says nothing of that.
   std::optional<std::set<std::string>> held_out = {};
   std::optional<double> depth_unit = {};  ///< of depth maps that the file names

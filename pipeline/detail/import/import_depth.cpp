@@ -32,9 +32,14 @@ DepthImage ToPlaneZOfDistorted(DepthImage depth, const io::NamedCamera& named,
 
 }  // namespace
 
-fs::path DepthFileOf(const io::NamedCamera& named, const ImportOptions& options) {
-  if (!named.depth_file.empty()) return options.depth_dir / named.depth_file;
+std::vector<fs::path> DepthFilesOf(const io::NamedCamera& named, const ImportOptions& options) {
   std::vector<fs::path> found;
+  if (!named.depth_file.empty()) {
+    if (const fs::path file = options.depth_dir / named.depth_file; fs::exists(file)) {
+      found.push_back(file);
+    }
+    return found;
+  }
   for (const char* extension : {".exr", ".pfm", ".png", ".tif", ".tiff", ".npy", ".EXR", ".PFM",
                                 ".PNG", ".TIF", ".TIFF", ".NPY"}) {
     const fs::path file = options.depth_dir / fs::path(named.name).replace_extension(extension);
@@ -45,6 +50,12 @@ fs::path DepthFileOf(const io::NamedCamera& named, const ImportOptions& options)
     });
     if (fs::exists(file) && !known) found.push_back(file);
   }
+  return found;
+}
+
+fs::path DepthFileOf(const io::NamedCamera& named, const ImportOptions& options) {
+  if (!named.depth_file.empty()) return options.depth_dir / named.depth_file;
+  const std::vector<fs::path> found = DepthFilesOf(named, options);
   if (found.size() != 1) {
     throw Error(options.depth_dir.string() +
                 ": expected one depth map (.exr, .pfm, .png, .tif, .npy) " +

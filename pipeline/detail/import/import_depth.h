@@ -2,10 +2,16 @@
 #pragma once
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "pipeline/detail/import/import_views.h"
 
 namespace dtr::pipeline {
+
+/// The depth maps that a camera may mean: the one its list names, if it is there, else all with the
+/// photo's name.
+std::vector<std::filesystem::path> DepthFilesOf(const io::NamedCamera& named,
+                                                const ImportOptions& options);
 
 /// The depth map of a camera: the one its list names, else the only one with the photo's name.
 /// Throws Error where there is none, or several.

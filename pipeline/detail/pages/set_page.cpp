@@ -1,5 +1,7 @@
 #include "pipeline/detail/pages/set_page.h"
 
+#include <fmt/format.h>
+
 #include "dtr/base/files.h"
 #include "dtr/report/set_report.h"
 
@@ -17,6 +19,14 @@ void WriteSetPage(const io::SetWriter& writer, const DtrSet& set, const SetPageF
                 {"held out", std::to_string(all - views.size())},
                 {"depth engine", facts.engine},
                 {"not registered", std::to_string(facts.not_registered)}};
+  if (facts.prior) {
+    for (const std::string& line : facts.prior->lines) info.facts.emplace_back("depth prior", line);
+    for (const stereo::PriorBin& bin : facts.prior->agreement.by_distance) {
+      info.facts.emplace_back(fmt::format("depth prior, {:.3g} to {:.3g}", bin.near_z, bin.far_z),
+                              fmt::format("bias {:+.2f} %, noise {:.2f} % of the depth, {} points",
+                                          100 * bin.bias, 100 * bin.noise, bin.points));
+    }
+  }
   info.checks = facts.checks;
   progress.Stage("page", static_cast<int>(views.size()));
   int done = 0;

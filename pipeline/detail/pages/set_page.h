@@ -1,5 +1,6 @@
 // pipeline/detail/pages/set_page.h -- report/index.html of a set.
 #pragma once
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -8,6 +9,7 @@
 #include "dtr/io/set_io.h"
 #include "dtr/types/check.h"
 #include "dtr/types/dtr_set.h"
+#include "pipeline/depth_prior.h"
 
 namespace dtr::pipeline {
 
@@ -18,6 +20,7 @@ struct SetPageFacts {
   std::vector<Check> checks;
   std::vector<std::pair<std::string, std::string>> skipped;  ///< file, reason
   size_t not_registered = 0;
+  std::optional<DepthPriorReport> prior = {};
   int threads = 0;
 };
 

@@ -7,6 +7,7 @@
 #include "pipeline/detail/photos/lens_of_photo.h"
 #include "pipeline/detail/reports/calibration_json.h"
 #include "pipeline/detail/reports/metres_json.h"
+#include "pipeline/detail/reports/prior_json.h"
 #include "pipeline/detail/reports/text.h"
 
 namespace dtr::pipeline {
@@ -43,6 +44,7 @@ Json OptionsJson(const BuildOptions& options, const stereo::QualitySettings& qua
   json["seed"] = options.seed;
   json["completion"] = options.depth.completion;
   if (options.depth.depth_error_px) json["depth_error_px"] = *options.depth.depth_error_px;
+  if (options.depth.prior.given()) json["depth_prior"] = PriorJson(options.depth.prior);
   return json;
 }
 
@@ -57,6 +59,7 @@ Json ProvenanceJson(const BuildOptions& options, const Json& option_values, cons
     provenance["scale"] = Json::array({JsonOf(*adjusted->metres)});
   }
   provenance["depth_engine"] = options.depth.engine;
+  if (report.prior) provenance["depth_prior"] = JsonOf(*report.prior);
   provenance["options"] = option_values;
   provenance["photos"] = photos;
   AddLenses(calibrated.model, provenance);
@@ -104,6 +107,7 @@ std::string ToJson(const BuildReport& report) {
   }
   json["coverage"] = report.coverage;
   json["validation_passed"] = report.validated ? Json(report.validation_passed) : Json(nullptr);
+  if (report.prior) json["depth_prior"] = JsonOf(*report.prior);
   json["stages"] = Json::array();
   for (const io::RunStage& stage : report.stages) {
     json["stages"].push_back(

@@ -48,11 +48,12 @@ TEST(ForeignDepth, EveryFormatGivesTheSameDepthsAndHoles) {
     EXPECT_THAT(depth.grid().data(), ::testing::ElementsAre(0.001f, 0.0025f, 0, 0, 0, 0, 1, 0.003f))
         << name;
   }
-  Grid<std::uint16_t> codes(2, 1);
-  codes.data() = {0, 65535};
+  // 65535 is what depth cameras write where they measured nothing.
+  Grid<std::uint16_t> codes(3, 1);
+  codes.data() = {0, 65534, 65535};
   WritePng16(folder / "a.png", codes);
-  const DepthImage depth = ReadForeignDepth(folder / "a.png", DepthKind::kPlaneZ, 0.001, 2, 1);
-  EXPECT_THAT(depth.grid().data(), ::testing::ElementsAre(0, 65.535f));
+  const DepthImage depth = ReadForeignDepth(folder / "a.png", DepthKind::kPlaneZ, 0.001, 3, 1);
+  EXPECT_THAT(depth.grid().data(), ::testing::ElementsAre(0, 65.534f, 0));
 }
 
 TEST(ForeignDepth, NumbersThatOverflowAreHoles) {
