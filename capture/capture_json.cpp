@@ -9,6 +9,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/file_names.h"
 #include "dtr/io/json_fields.h"
+#include "dtr/types/panorama.h"
 
 namespace dtr::capture {
 namespace {
@@ -130,6 +131,9 @@ Json ToJson(const Photo& photo) {
     json["video_frame"] = {
         {"video", frame->video}, {"number", frame->number}, {"time_s", frame->time_s}};
   }
+  if (const auto& face = photo.face) {
+    json["panorama"] = {{"name", face->panorama}, {"face", face->face}};
+  }
   if (!photo.mask_file.empty()) {
     json["mask"] = {{"file", photo.mask_file.generic_string()}, {"sha256", photo.mask_sha256}};
   }
@@ -208,6 +212,15 @@ Photo PhotoFrom(const Node& node) {
     photo.video_frame = {(*frame)["video"].Text(),
                          (*frame)["number"].Int(0, std::numeric_limits<int>::max()),
                          (*frame)["time_s"].Number(-kHuge, kHuge)};
+  }
+  if (const auto panorama = node.Optional("panorama")) {
+    photo.face = {(*panorama)["name"].Text(), (*panorama)["face"].Text()};
+    if (FaceCalled(photo.face->face).name.empty()) {
+      (*panorama)["face"].Fail(
+          "the name of a panorama's face: front, right, back, left, up or down");
+    }
+    if (photo.width_px != photo.height_px)
+      node["height_px"].Fail("its width, of a panorama's face");
   }
   if (const auto mask = node.Optional("mask")) {
     const std::string mask_file = (*mask)["file"].Text();

@@ -1,9 +1,12 @@
 #include "capture/ingest.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <set>
 #include <system_error>
 
@@ -16,6 +19,7 @@
 #include "dtr/base/hash.h"
 #include "dtr/base/lower_case.h"
 #include "dtr/base/memory_budget.h"
+#include "dtr/base/order_statistics.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/base/work_folder.h"
 
@@ -63,6 +67,8 @@ Photo InspectPhoto(const fs::path& file, const std::string& name, const fs::path
   photo.lens_model = Printable(header.lens_model);
   photo.date_time = Printable(header.date_time);
   photo.gps = header.gps;
+  photo.raw_balance = header.raw_balance;
+  photo.panorama = header.panorama;
   photo.camera_group = CameraGroup(photo, header);
   photo.source_sha256 = Sha256OfFile(file);
   if (mask.empty() && !screen && !header.has_alpha) return photo;
@@ -103,6 +109,31 @@ void AssignIds(std::vector<Photo>& photos) {
     if (stem.empty() || stem.front() == '-') stem.insert(0, "_");
     photo.id = stem;
     for (int n = 2; !take(photo.id); ++n) photo.id = stem + "-" + std::to_string(n);
+  }
+}
+
+// One white balance for all raw photos of a camera: that of each would colour a surface by what
+// else is in the photo. The median of what the camera chose, per channel.
+void BalanceRawPhotos(std::vector<Photo>& photos, Progress& progress) {
+  std::map<std::string, std::vector<Photo*>> of_camera;
+  for (Photo& photo : photos) {
+    if (photo.raw_balance) of_camera[photo.make + " " + photo.model].push_back(&photo);
+  }
+  for (const auto& [camera, group] : of_camera) {
+    io::RawBalance chosen{};
+    double spread = 1;
+    for (size_t c = 0; c < chosen.size(); ++c) {
+      std::vector<double> factors;
+      for (const Photo* photo : group) factors.push_back((*photo->raw_balance)[c]);
+      const auto [low, high] = std::minmax_element(factors.begin(), factors.end());
+      spread = std::max(spread, *high / *low);
+      chosen[c] = UpperMedian(factors);
+    }
+    for (Photo* photo : group) photo->raw_balance = chosen;
+    progress.Note(fmt::format(
+        "{} raw photos of {}: developed without automatic brightness, with one white balance (red "
+        "{:.3g}, blue {:.3g} of green; the camera's differ by {:.0f} %)",
+        group.size(), camera, chosen[0], chosen[2], 100 * (spread - 1)));
   }
 }
 
@@ -241,6 +272,7 @@ Capture IngestPhotos(const fs::path& folder, const IngestOptions& options, Progr
   std::sort(capture.skipped.begin(), capture.skipped.end(),
             [](const Skipped& a, const Skipped& b) { return a.name < b.name; });
   if (capture.photos.empty()) ThrowNoPhotos(folder, capture);
+  BalanceRawPhotos(capture.photos, progress);
   AssignIds(capture.photos);
   ScreenPhotos(capture.photos);
   Announce(capture, progress);

@@ -114,8 +114,8 @@ void RequireEnoughPhotos(const Capture& capture, const std::filesystem::path& wh
 namespace {
 
 io::ImageAndMask ReadOnGrid(const Photo& photo) {
-  io::ImageAndMask read =
-      io::ReadImageAndMask(photo.file, {.apply_exif_orientation = !photo.as_stored});
+  io::ImageAndMask read = io::ReadImageAndMask(
+      photo.file, {.apply_exif_orientation = !photo.as_stored, .raw_balance = photo.raw_balance});
   const ImageRgb8& image = read.image;
   if (image.width() != photo.width_px || image.height() != photo.height_px) {
     throw Error(photo.file.string() + ": expected a photo of " + std::to_string(photo.width_px) +

@@ -44,6 +44,12 @@ struct VideoFrame {
   double time_s = 0;  ///< when the video shows it
 };
 
+/// Which pinhole view of which panorama a photo is (split_panoramas.h).
+struct FaceOfPanorama {
+  std::string panorama;  ///< name of the panorama that was split
+  std::string face;      ///< PanoramaFace::name
+};
+
 /// What the alpha channel of a photo's file says, where it is not opaque throughout.
 struct PhotoAlpha {
   std::int64_t transparent_px = 0;
@@ -70,7 +76,11 @@ struct Photo {
   std::string date_time;  ///< "YYYY:MM:DD HH:MM:SS" or empty
   std::optional<io::GpsPosition> gps;
 
+  /// Of raw files: the white balance to develop it with, one for all of a camera.
+  std::optional<io::RawBalance> raw_balance;
   std::optional<VideoFrame> video_frame;
+  std::optional<io::PanoramaXmp> panorama;  ///< what its file states; not stored with a capture
+  std::optional<FaceOfPanorama> face;       ///< of a panorama that was split
 
   /// What of the photo may be used, NAME_mask.EXT beside NAME.EXT: an upright image of its size,
   /// dark where the photo is not to be used (moving things, the photographer, the turntable).

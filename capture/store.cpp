@@ -60,12 +60,13 @@ void AsError(const std::function<void()>& function) {
 // Returns the photo as it lies in the capture, `file` relative to its folder.
 Photo StorePhoto(const Photo& photo, const fs::path& folder) {
   Photo stored = photo;
-  if (photo.exif_orientation == 1) {
+  if (photo.exif_orientation == 1 && !photo.raw_balance) {
     stored.file = fs::path("images") / (photo.id + LowerExtension(photo.file));
     CopyFileAtomically(photo.file, folder / stored.file);
   } else {
     stored.file = fs::path("images") / (photo.id + ".png");
     stored.exif_orientation = 1;
+    stored.raw_balance.reset();
     io::WriteImage(folder / stored.file, ReadPhoto(photo));
   }
   if (photo.HasMask()) {

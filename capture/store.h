@@ -27,8 +27,8 @@ struct StoreOptions {
 };
 
 /// Writes a capture: `folder`/images/<id>.<extension>, masks/<id>.png where there are masks and,
-/// last, capture.json. A photo that is upright already keeps its bytes; a turned one becomes a PNG
-/// with exactly its pixels. The folder appears whole or not at all: work goes on in
+/// last, capture.json. A photo that is upright already keeps its bytes; a turned or raw one becomes
+/// a PNG with exactly its pixels. The folder appears whole or not at all: work goes on in
 /// `folder`.partial, which one process at a time has and which is gone at the end unless the
 /// process is killed; then the next one clears it away. A replaced capture is deleted last; one
 /// that a killed process had moved aside is put back by the next. What is not ours stays.

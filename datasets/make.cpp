@@ -14,6 +14,8 @@
 #include "dtr/io/depth_io.h"
 #include "dtr/io/formats/cameras_json.h"
 #include "dtr/io/image_io.h"
+#include "dtr/io/panorama_xmp.h"
+#include "dtr/types/panorama.h"
 
 namespace dtr::datasets {
 namespace {
@@ -50,6 +52,10 @@ void Check(const DatasetSpec& spec) {
     CheckRange("world offset", spec.world_offset[k], -kMaxOffset, kMaxOffset);
   }
   CheckRange("time", spec.time_s, -kMaxSeconds, kMaxSeconds);
+  if (spec.panoramas && (spec.width_px % 2 != 0 || spec.k1 != 0 || spec.k2 != 0)) {
+    throw UsageError(
+        "panoramas: expected an even width and no lens distortion; the views have none");
+  }
   CheckRange("JPEG quality", spec.jpeg_quality, 1, 100);
 }
 
@@ -60,6 +66,15 @@ std::string NumberName(int i) {
 }
 
 std::string SourceText(const DatasetSpec& spec) {
+  if (spec.panoramas) {
+    return "# " + spec.scene + ", " + std::to_string(spec.views) +
+           " panoramas, synthetic\n"
+           "Made by `dtr dataset make` (ray cast, analytic surfaces, procedural texture: no "
+           "downloaded asset); the recipe is dataset.json.\n"
+           "- `panoramas/`: equirectangular, rays of longitude and latitude.\n"
+           "- `images/`, `depth/`, `cameras.json`: the views of a cube around each panorama, "
+           "rendered as pinhole cameras, exact.\n";
+  }
   return "# " + spec.scene + ", " + std::to_string(spec.views) +
          " views, synthetic\n"
          "Made by `dtr dataset make` (ray cast, analytic surfaces, procedural texture: no "
@@ -111,6 +126,41 @@ void WriteView(const DatasetSpec& spec, const Scene& scene, const std::vector<Po
   io::WriteMask(folder / "masks" / (name + "_texture.png"), TextureMask(clean));
 }
 
+/// One panorama's files: itself, and the views of a cube around it, exact.
+void WritePanorama(const DatasetSpec& spec, const Scene& scene, const Pose& pose, int i,
+                   const fs::path& folder, int threads, io::CameraList& list) {
+  const std::string name = NumberName(i);
+  PhotoOptions options;
+  options.supersampling = spec.supersampling;
+  options.noise_sigma = spec.noise;
+  options.gain = ExposureGain(spec.exposure_drift, i, spec.views);
+  options.threads = threads;
+  options.seed = HashOf(spec.seed, static_cast<std::uint64_t>(i));
+  io::WritePanoramaJpeg(folder / "panoramas" / (name + ".jpg"),
+                        Develop(RenderPanoramaLight(scene, spec.width_px, pose, options), options),
+                        spec.jpeg_quality);
+  const PinholeCamera camera = FaceCamera(FaceSizePx(spec.width_px));
+  const auto faces = PanoramaFaces();
+  for (size_t f = 0; f < faces.size(); ++f) {
+    const Pose face_pose =
+        Pose{Eigen::Quaterniond(faces[f].cam_from_panorama).normalized(), {0, 0, 0}} * pose;
+    options.seed = HashOf(spec.seed, static_cast<std::uint64_t>(i), f);
+    for (const char* part : {"images", "depth"}) {
+      fs::create_directories(folder / part / faces[f].name);
+    }
+    io::WriteImage(folder / "images" / faces[f].name / (name + ".jpg"),
+                   RenderPhoto(scene, camera, face_pose, options), spec.jpeg_quality);
+    io::WriteExr(folder / "depth" / faces[f].name / (name + ".exr"),
+                 RenderDepth(scene, camera, face_pose, threads, spec.scale).grid());
+    io::NamedCamera named;
+    named.name = faces[f].name + "/" + name + ".jpg";
+    named.depth_file = faces[f].name + "/" + name + ".exr";
+    named.camera = camera;
+    named.cam_from_world = WrittenPose(face_pose, spec.scale, spec.world_offset);
+    list.cameras.push_back(std::move(named));
+  }
+}
+
 }  // namespace
 
 double ExposureGain(double drift_stops, int i, int views) {
@@ -144,13 +194,20 @@ void MakeDataset(const DatasetSpec& given, const fs::path& given_folder, int thr
 
   WorkFolder work(WorkFolder::Of(out_folder), "dataset");
   const fs::path& partial = work.path();
-  for (const char* part : {"images", "depth", "masks"}) fs::create_directory(partial / part);
+  for (const char* part : {"images", "depth", spec.panoramas ? "panoramas" : "masks"}) {
+    fs::create_directory(partial / part);
+  }
 
   progress.Stage("rendering photos and truth", spec.views);
   io::CameraList list;
   list.unit = spec.scale == 1 ? LengthUnit::kMetre : LengthUnit::kArbitrary;
   for (int i = 0; i < spec.views; ++i) {
     progress.ThrowIfInterrupted();
+    if (spec.panoramas) {
+      WritePanorama(spec, scene, poses[static_cast<size_t>(i)], i, partial, threads, list);
+      progress.Update(i + 1);
+      continue;
+    }
     WriteView(spec, scene, poses, i, partial, threads);
     io::NamedCamera camera;
     camera.name = NumberName(i) + ".jpg";

@@ -28,6 +28,10 @@ struct DatasetSpec {
   /// are transformed.
   Eigen::Vector3d world_offset = Eigen::Vector3d::Zero();
   double scale = 1;
+  /// Photos are whole equirectangular panoramas of `width_px` x width_px / 2, in panoramas/; the
+  /// views of a cube around each are rendered as pinhole cameras would, in images/ and depth/.
+  /// height_px, focal_35mm and the lens play no part.
+  bool panoramas = false;
   double time_s = 0;  ///< the time step, where something moves (MakeScene)
   int jpeg_quality = 95;
 };
@@ -46,6 +50,8 @@ Pose WrittenPose(const Pose& cam_from_scene, double scale, const Eigen::Vector3d
 ///   masks/NNNN_visible.png   255: the surface point is seen by at least 2 other views
 ///   masks/NNNN_texture.png   255: textured, evaluated on the ideal grid and before noise
 ///   dataset.json, SOURCE.md  how it was made
+/// With `panoramas`: panoramas/NNNN.jpg (XMP GPano), and of each view of the cube (FaceSizePx)
+/// images/FACE/NNNN.jpg, depth/FACE/NNNN.exr and a camera FACE/NNNN.jpg in cameras.json; no masks.
 /// The folder appears when all is done, under its name with ".partial" before.
 /// Throws UsageError when it exists or the spec is out of range (naming the field), Error when
 /// something cannot be written.

@@ -4,12 +4,15 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <numbers>
+#include <stdexcept>
 #include <string>
 
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/base/random.h"
 #include "dtr/render/geometry.h"
+#include "dtr/types/panorama.h"
 
 namespace dtr::datasets {
 namespace {
@@ -168,6 +171,40 @@ Grid<float> RenderLight(const Scene& scene, const PinholeCamera& camera, const P
         if (!hit) continue;
         last = hit->primitive;
         sum += scene.Radiance(*hit, FootprintAt(camera, ray, *hit));
+      }
+      for (int c = 0; c < 3; ++c) light(x, y, c) = static_cast<float>(sum[c] / (n * n));
+    }
+  });
+  return light;
+}
+
+Grid<float> RenderPanoramaLight(const Scene& scene, int width_px, const Pose& cam_from_world,
+                                const PhotoOptions& options) {
+  if (width_px < 2 || width_px % 2 != 0) {
+    throw std::invalid_argument("RenderPanoramaLight: the width must be even");
+  }
+  // Its size at the equator is that of a pixel: a sphere around a pinhole camera of that focal
+  // length.
+  const double focal_px = width_px / (2 * std::numbers::pi);
+  const PinholeCamera scale(width_px, width_px / 2, focal_px, focal_px, 0, 0);
+  PhotoOptions without_lens = options;
+  without_lens.lens = {};
+  CheckPhotoOptions(scale, without_lens);
+  const Panorama panorama{static_cast<double>(width_px), width_px / 2.0, 0, 0};
+  const RayCaster caster(scale, cam_from_world);
+  const int n = options.supersampling;
+  Grid<float> light(width_px, width_px / 2, 3);
+  ParallelFor(0, light.height(), options.threads, [&](int y) {
+    int last = -1;
+    for (int x = 0; x < width_px; ++x) {
+      Vector3d sum = Vector3d::Zero();
+      for (int k = 0; k < n * n; ++k) {
+        const Vector2d pixel(x + (k % n + 0.5) / n, y + (k / n + 0.5) / n);
+        const Ray ray = caster.ThroughDirection(panorama.DirectionFromPixel(pixel));
+        const std::optional<Hit> hit = scene.Intersect(ray, kNoHit, last);
+        if (!hit) continue;
+        last = hit->primitive;
+        sum += scene.Radiance(*hit, FootprintAt(scale, ray, *hit));
       }
       for (int c = 0; c < 3; ++c) light(x, y, c) = static_cast<float>(sum[c] / (n * n));
     }

@@ -38,6 +38,13 @@ void CheckPhotoOptions(const PinholeCamera& camera, const PhotoOptions& options)
 Grid<float> RenderLight(const Scene& scene, const PinholeCamera& camera, const Pose& cam_from_world,
                         const PhotoOptions& options);
 
+/// The same of a whole equirectangular panorama (dtr/types/panorama.h) of width_px x width_px / 2
+/// around the centre of `cam_from_world`, whose z axis is in its middle: n x n samples per pixel on
+/// a regular grid of longitude and latitude. options.lens plays no part. Throws as
+/// CheckPhotoOptions, and std::invalid_argument for an odd width.
+Grid<float> RenderPanoramaLight(const Scene& scene, int width_px, const Pose& cam_from_world,
+                                const PhotoOptions& options);
+
 /// The photo of that light: exposure, clipping at white, the sRGB transfer function of
 /// IEC 61966-2-1, noise, rounding to 8 bits.
 ImageRgb8 Develop(const Grid<float>& light, const PhotoOptions& options);

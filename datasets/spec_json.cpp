@@ -66,6 +66,7 @@ std::string FormatSpecJson(const DatasetSpec& spec) {
   json["world_offset"] = {spec.world_offset.x(), spec.world_offset.y(), spec.world_offset.z()};
   json["scale"] = spec.scale;
   json["jpeg_quality"] = spec.jpeg_quality;
+  if (spec.panoramas) json["panoramas"] = true;
   if (spec.time_s != 0) json["time_s"] = spec.time_s;  // still scenes have no time
   return json.dump(2) + "\n";
 }
@@ -105,6 +106,9 @@ DatasetSpec ParseSpecJson(const std::string& text, const std::string& source) {
   for (int k = 0; k < 3; ++k) spec.world_offset[k] = offset[static_cast<size_t>(k)].get<double>();
   spec.scale = NumberOf(json, "scale", source);
   spec.jpeg_quality = IntOf(json, "jpeg_quality", source);
+  if (json.contains("panoramas")) {
+    spec.panoramas = FieldOf<bool>(json, "panoramas", &Json::is_boolean, "true or false", source);
+  }
   if (json.contains("time_s")) spec.time_s = NumberOf(json, "time_s", source);
   return spec;
 }

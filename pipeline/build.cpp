@@ -90,7 +90,7 @@ std::vector<std::pair<int, int>> SizesOf(const BuildOptions& options,
     sizes.emplace_back(picture.width(), picture.height());
   }
   for (size_t i = 0; i < photos.photos.size(); ++i) {
-    if (options.holdout_strict && held_out[i]) continue;
+    if (options.holdout_strict && i < held_out.size() && held_out[i]) continue;
     sizes.emplace_back(photos.photos[i].width_px, photos.photos[i].height_px);
   }
   return sizes;
@@ -105,7 +105,20 @@ Json VideoJson(const BuildOptions& options) {
           {"synchronised", options.video.synchronised}};
 }
 
-// The frames of a video, chosen once: a later run of the same build finds them in `folder`.
+// Which photos are held out; of panoramas whole ones.
+std::vector<bool> HeldOutOf(const std::string& spec, const capture::Capture& photos) {
+  if (photos.photos.empty() || !photos.photos.front().face) {
+    return ChooseHeldOut(spec, NamesOf(photos));
+  }
+  std::vector<std::string> panoramas;
+  for (const capture::Photo& photo : photos.photos) {
+    panoramas.push_back(photo.face ? photo.face->panorama : "");
+  }
+  return ChooseHeldOutPanoramas(spec, NamesOf(photos), panoramas);
+}
+
+// The frames of a video, chosen once, and the views of panoramas: a later run of the same build
+// finds them in `folder`.
 capture::Capture FramesOf(const BuildOptions& options, const std::filesystem::path& folder,
                           Progress& progress) {
   const std::filesystem::path kept = folder / "capture", fresh = folder / "frames";
@@ -114,7 +127,7 @@ capture::Capture FramesOf(const BuildOptions& options, const std::filesystem::pa
     video.threads = options.threads;
     video.memory_gb = options.depth.memory_gb.value_or(kDefaultMemoryGb);
     const capture::Capture frames = Ingest(
-        options.photos, video, [&] { return fresh; }, progress);
+        options.photos, video, options.panoramas, [&] { return fresh; }, progress);
     capture::WriteCapture(
         frames, kept, {.replace = false, .threads = options.threads, .memory_gb = video.memory_gb},
         progress);
@@ -248,6 +261,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   io::SetWriter::RequireTarget(options.output, options.force);
   log.Begin("capture");
   const bool from_video = !capture::VideosOf(options.photos).empty();
+  bool is_derived = from_video;  // photos are made, in the work folder
   capture::Capture photos;
   std::vector<bool> held_out;
   const auto look = [&] {
@@ -255,28 +269,39 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
     capture::RequireEnoughPhotos(photos, options.photos);
     if (!options.poses.empty())
       TakePhotosAsCamerasDo(options.poses, options.poses_format, photos, progress);
-    held_out = ChooseHeldOut(options.holdout, NamesOf(photos));
+    held_out = HeldOutOf(options.holdout, photos);
+    if (options.poses.empty()) {
+      if (auto panoramas = RigOfPanoramas(photos)) {
+        RequirePanoramaOptions(options);
+        rig = std::move(panoramas);
+      }
+    }
     RequireMetres(options.metres, photos, options.photos.string(),
                   options.holdout_strict ? held_out : std::vector<bool>());
     if (!rig) return;
     (void)PhotosOfRig(*rig, photos);  // rejected here, before any work
-    TellPhotosTheirLens(*rig, photos);
+    if (!calib::HasOneCentre(rig->known)) TellPhotosTheirLens(*rig, photos);
   };
   if (!from_video) {
     photos = capture::IngestPhotos(options.photos,
                                    {.threads = options.threads, .memory_gb = memory_gb}, progress);
-    look();
+    is_derived = capture::ArePanoramas(photos, options.panoramas);
+    if (is_derived && options.poses.empty()) RequirePanoramaOptions(options);
+    if (!is_derived) look();
   }
   Json fingerprint = {
       {"tool_version", DTR_VERSION},
       {"options", OptionsJson(options, quality)},
       {"time_budget_s", options.depth.time_budget_s.value_or(0)},
       {"photos", from_video ? VideoJson(options)
-                            : PhotosJson(photos, std::vector<bool>(held_out.size(), true))},
+                            : PhotosJson(photos, std::vector<bool>(photos.photos.size(), true))},
       {"poses_sha256", PosesHash(options.poses)},
       {"workspace_sha256", InputHash(options.depth.workspace)},
       {"prior_sha256", InputHash(options.depth.prior.folder)}};
-  if (rig) fingerprint["rig_sha256"] = InputHash(options.rig);
+  if (!options.rig.empty()) fingerprint["rig_sha256"] = InputHash(options.rig);
+  if (options.panoramas != capture::PanoramaUse::kAuto) {
+    fingerprint["panoramas"] = options.panoramas == capture::PanoramaUse::kAlways;
+  }
   if (std::filesystem::exists(options.photos / capture::kCaptureFile)) {
     fingerprint["stored_sha256"] = StoredHashes(photos);
   }
@@ -290,7 +315,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   }
   io::SetWriter writer(options.output, fingerprint.dump(), options.force);
   if (!options.force_stage.empty()) ForgetStage(writer.folder(), options.force_stage);
-  if (from_video) {
+  if (is_derived) {
     photos = FramesOf(options, writer.work_folder(), progress);
     try {
       look();
@@ -326,6 +351,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   calibrate.seed = options.seed;
   calibrate.memory_gb = memory_gb;
   calibrate.refine = options.refine;
+  calibrate.refine_poses = options.refine_poses;
   calibrate.rig = rig;
   calibrate.metres = options.metres;
   calibrate.sfm = options.sfm;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "capture/split_panoramas.h"
 #include "capture/video/ingest_video.h"
 #include "dtr/base/progress.h"
 #include "dtr/io/set_io.h"
@@ -22,8 +23,9 @@ namespace dtr::pipeline {
 struct BuildOptions {
   std::filesystem::path photos;  ///< folder, a video, or a folder of nothing but videos
   capture::VideoOptions video;   ///< its threads are those below
-  std::filesystem::path output;  ///< NAME.dtr
-  std::string holdout;           ///< "", "every:N" or names
+  capture::PanoramaUse panoramas = capture::PanoramaUse::kAuto;  ///< which photos are split
+  std::filesystem::path output;                                  ///< NAME.dtr
+  std::string holdout;                                           ///< "", "every:N" or names
   bool holdout_strict = false;
   DepthChoice depth;
   int max_size_px = -1;           ///< long side; 0 = full size, -1 = what the preset says
@@ -31,6 +33,7 @@ struct BuildOptions {
   std::string poses_format = {};  ///< its name; empty: by the content
   bool keep_duplicates = false;   ///< photos with the same pixels as another one
   bool refine = true;             ///< bundle adjustment after SfM, where it pays
+  bool refine_poses = false;      ///< the same of the cameras of `poses`
   std::filesystem::path rig;      ///< calibration of the rig that took all photos; empty: none
   SfmChoice sfm;                  ///< how cameras are looked for
   MetreOptions metres;            ///< places and distances that the refinement holds

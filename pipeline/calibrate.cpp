@@ -15,6 +15,7 @@
 #include "dtr/base/error.h"
 #include "pipeline/detail/cameras/camera_formats.h"
 #include "pipeline/detail/cameras/known_poses.h"
+#include "pipeline/detail/cameras/panorama_poses.h"
 #include "pipeline/detail/photos/exif_focal.h"
 #include "pipeline/detail/reports/calibration_json.h"
 #include "pipeline/detail/reports/text.h"
@@ -52,12 +53,19 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
   const capture::Capture photos = Subset(capture, in_sfm);
   const CameraGroups groups(photos.photos, options.sfm.camera_per, options.rig || options.lens);
   const std::vector<colmap::SfmImageInput> inputs = SfmInputs(photos, groups, workspace / "photos");
-  const colmap::SfmOptions sfm_options = SfmOptionsFor(options);
+  colmap::SfmOptions sfm_options = SfmOptionsFor(options);
+  const bool panoramas = options.rig && calib::HasOneCentre(options.rig->known);
+  if (panoramas) {
+    sfm_options.intrinsics_are_known = true;
+    sfm_options.lens_model = calib::NameOf(calib::CameraModel::kSimplePinhole);
+  }
   capture::PrepareSfmImages(photos, workspace / "photos", 0, options.threads, options.memory_gb,
                             progress);
   colmap::SfmResult sfm =
       colmap::RunSfm(workspace / "photos", inputs, workspace / "sfm", sfm_options, progress);
-
+  if (panoramas) {
+    CompletePanoramas(capture, *options.rig, inputs, workspace, sfm_options, sfm, progress);
+  }
   PhotoRefinement refined = RefineSfm({.capture = capture,
                                        .options = options,
                                        .groups = groups,
@@ -120,7 +128,8 @@ std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
   std::vector<colmap::SfmImageInput> inputs;
   for (const capture::Photo& photo : capture.photos) {
     inputs.push_back({photo.name, photo.width_px, photo.height_px, photo.focal_prior_px,
-                      groups.GroupOf(photo), capture::SfmMaskFile(folder, photo)});
+                      groups.GroupOf(photo), capture::SfmMaskFile(folder, photo),
+                      photo.face ? photo.face->panorama : std::string()});
   }
   return inputs;
 }
@@ -168,9 +177,10 @@ void RequireCalibration(const fs::path& poses, const std::string& poses_format,
 CalibratedPhotos CalibratePhotos(const capture::Capture& capture, const CalibrateOptions& options,
                                  const fs::path& workspace, Progress& progress) {
   CalibrateOptions checked = options;
+  if (!checked.rig && checked.poses.empty()) checked.rig = RigOfPanoramas(capture);
   checked.held_out.resize(capture.photos.size(), false);
   RequireCalibration(checked.poses, checked.poses_format, checked.sfm);
-  if (checked.rig) RejectTurned(capture, "the rig is");
+  if (checked.rig && !calib::HasOneCentre(checked.rig->known)) RejectTurned(capture, "the rig is");
   if (checked.lens) RejectTurned(capture, "the intrinsics are");
   fs::create_directories(workspace);
   CalibratedPhotos calibrated = checked.poses.empty()

@@ -30,6 +30,8 @@ struct CalibrateOptions {
   double memory_gb = 4;
   bool refine =
       true;  ///< bundle adjustment after SfM, where held-out observations say that it pays
+  /// Cameras of `poses` are adjusted, too, where held-out observations say that it pays.
+  bool refine_poses = false;
   std::optional<calib::LensCamera> lens;  ///< of all photos, known: SfM's own is replaced by it
   std::optional<SetRig> rig;              ///< took all photos: its lenses, places and scale hold
   MetreOptions metres;  ///< places and distances to hold while SfM's model is refined

@@ -8,6 +8,7 @@
 
 #include "calib/bundle/refine.h"
 #include "calib/bundle/rig_adjust.h"
+#include "calib/validation/conventions.h"
 #include "pipeline/metres.h"
 #include "pipeline/set_rig.h"
 #include "pipeline/sfm_settings.h"
@@ -75,6 +76,8 @@ struct CalibrationReport {
   std::optional<CameraSharing> camera_sharing;
   std::optional<BundleAdjustment> bundle_adjustment;
   std::optional<ExifFocal> exif_focal;
+  /// Whether cameras that were given fit the photos, where they came without points.
+  std::optional<calib::ConventionReport> given_cameras;
 };
 
 }  // namespace dtr::pipeline

@@ -22,16 +22,23 @@ std::vector<fs::path> VideosFor(const fs::path& source, const capture::VideoOpti
 }
 
 capture::Capture Ingest(const fs::path& source, const capture::VideoOptions& video,
+                        capture::PanoramaUse panoramas,
                         const std::function<fs::path()>& frames_folder, Progress& progress) {
   const std::vector<fs::path> videos = VideosFor(source, video);
+  capture::Capture photos;
   if (videos.empty()) {
-    return capture::IngestPhotos(source, {.threads = video.threads, .memory_gb = video.memory_gb},
-                                 progress);
+    photos = capture::IngestPhotos(source, {.threads = video.threads, .memory_gb = video.memory_gb},
+                                   progress);
+  } else {
+    const fs::path frames = frames_folder();
+    fs::remove_all(frames);
+    fs::create_directories(frames);
+    photos = capture::IngestVideos(videos, video, frames, progress);
   }
-  const fs::path frames = frames_folder();
-  fs::remove_all(frames);
-  fs::create_directories(frames);
-  return capture::IngestVideos(videos, video, frames, progress);
+  if (!capture::ArePanoramas(photos, panoramas)) return photos;
+  const fs::path views = frames_folder() / "views";
+  fs::remove_all(views);
+  return capture::SplitPanoramas(photos, views, video.threads, progress);
 }
 
 }  // namespace dtr::pipeline

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "capture/photo.h"
+#include "capture/split_panoramas.h"
 #include "capture/video/ingest_video.h"
 #include "dtr/base/progress.h"
 #include "dtr/types/grid.h"
@@ -19,9 +20,10 @@ std::vector<std::filesystem::path> VideosFor(const std::filesystem::path& source
 
 /// The photos of a folder, or the chosen frames of a video or of a folder of videos, which are
 /// written first into the folder that `frames_folder` names (what is there already is removed); it
-/// is asked once it is known that frames are to come. Throws as capture::IngestPhotos and
-/// capture::IngestVideos do.
+/// is asked once it is known that frames are to come. Panoramas are split, into a folder below it.
+/// Throws as capture::IngestPhotos, capture::IngestVideos and capture::SplitPanoramas do.
 capture::Capture Ingest(const std::filesystem::path& source, const capture::VideoOptions& video,
+                        capture::PanoramaUse panoramas,
                         const std::function<std::filesystem::path()>& frames_folder,
                         Progress& progress);
 

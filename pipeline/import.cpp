@@ -95,8 +95,8 @@ std::optional<double> DepthUnit(const ImportRequest& request, const CamerasFromF
 }
 
 // Points of a set without depth, where the cameras come without: COLMAP finds them.
-void FindPoints(const ImportRequest& request, const ImportOptions& options,
-                CamerasFromFile& cameras, Progress& progress) {
+void FindPoints(const ImportRequest& request, ImportOptions& options, CamerasFromFile& cameras,
+                Progress& progress) {
   if (!request.depth.empty() || (cameras.points && !cameras.points->points.empty())) return;
   if (!cameras.points_file.empty()) {
     progress.Note(
@@ -114,7 +114,8 @@ void FindPoints(const ImportRequest& request, const ImportOptions& options,
   calibrate.memory_gb = request.memory_gb;
   calibrate.poses = request.cameras;
   const TemporaryFolder workspace;
-  cameras.points = TriangulatedPoints(cameras.list, photos, calibrate, workspace.path(), progress);
+  cameras.points = TriangulatedPoints(cameras.list, photos, calibrate, workspace.path(),
+                                      options.conventions.emplace(), progress);
 }
 
 ImportOptions OptionsFor(const ImportRequest& request, CamerasFromFile& cameras,
@@ -165,7 +166,7 @@ ImportReport Import(ImportRequest request, Progress& listener) {
                                             .allow_missing = request.allow_missing});
   for (const std::string& note : cameras.notes) progress.Note(note);
   TakeFolders(cameras, request);
-  const ImportOptions options = OptionsFor(request, cameras, progress);
+  ImportOptions options = OptionsFor(request, cameras, progress);
   io::SetWriter::RequireTarget(request.output, request.force);
   ImportReport report;
   report.contents = ContentsFor(options, cameras.list);

@@ -10,6 +10,7 @@
 #include "calib/files/rig_files.h"
 #include "dtr/base/error.h"
 #include "dtr/io/json_fields.h"
+#include "dtr/types/panorama.h"
 #include "pipeline/detail/boards/rig_names.h"
 
 namespace dtr::pipeline {
@@ -21,6 +22,7 @@ using io::Json;
 // The set's poses are the rig's to rounding when it is built; features are not found to better.
 constexpr double kMaxPlacesPx = 0.1;
 constexpr char kProvenance[] = "provenance";
+constexpr char kPanoramas[] = "panoramas";  // in place of a rig's file
 
 std::string ListedPhotos(const std::vector<std::string>& names) {
   std::string list;
@@ -49,6 +51,7 @@ bool StandApart(const SetRig& rig, size_t a, size_t b) {
 
 void RequireSharedTimeStep(const SetRig& rig,
                            const std::map<std::string, calib::RigPhoto>& photos) {
+  if (calib::HasOneCentre(rig.known)) return;
   std::map<std::string, size_t> first_of;
   for (const auto& [name, photo] : photos) {
     const size_t first = first_of.emplace(photo.frame, photo.camera).first->second;
@@ -126,6 +129,36 @@ SetRig ForeignRig(const fs::path& file) {
 }
 
 }  // namespace
+
+std::optional<SetRig> RigOfPanoramas(const capture::Capture& capture) {
+  const capture::Photo *view = nullptr, *other = nullptr;
+  SetRig rig;
+  rig.file = kPanoramas;
+  rig.unit = LengthUnit::kArbitrary;
+  for (const capture::Photo& photo : capture.photos) {
+    if (!photo.face || (view != nullptr && photo.width_px != view->width_px)) other = &photo;
+    if (!photo.face) continue;
+    if (view == nullptr) view = &photo;
+    if (CameraCalled(rig, photo.face->face)) continue;
+    rig.names.push_back(photo.face->face);
+    const int size_px = photo.width_px;
+    rig.known.lenses.push_back({calib::CameraModel::kSimplePinhole,
+                                size_px,
+                                size_px,
+                                {size_px / 2.0, size_px / 2.0, size_px / 2.0}});
+    rig.known.cam_from_rig.push_back(
+        {Eigen::Quaterniond(FaceCalled(photo.face->face).cam_from_panorama).normalized(),
+         Eigen::Vector3d::Zero()});
+  }
+  if (view == nullptr) return std::nullopt;
+  if (other != nullptr) {
+    throw Error(
+        fmt::format("{} is a view of {} x {} px of a panorama, {} is none; give a capture of "
+                    "panoramas alone, as dtr capture makes it",
+                    view->name, view->width_px, view->height_px, other->name));
+  }
+  return rig;
+}
 
 SetRig ReadSetRig(const fs::path& file) {
   const std::string extension = file.extension().string();

@@ -23,6 +23,11 @@ struct SetRig {
   LengthUnit unit = LengthUnit::kUnknown;  ///< of that: metre where the board was given with one
 };
 
+/// The rig that the views of panoramas are (capture::SplitPanoramas): one centre, exact rotations
+/// and intrinsics, no unit. Empty where the photos are no such views. Throws Error where some are
+/// and some are not, or they differ in size.
+std::optional<SetRig> RigOfPanoramas(const capture::Capture& capture);
+
 /// Reads what `dtr calibrate rig` wrote. Throws UsageError unless it is a .json file that exists,
 /// Error where it is broken or holds a single camera.
 SetRig ReadSetRig(const std::filesystem::path& file);

@@ -9,6 +9,7 @@
 #include "dtr/eval/cross_depth.h"
 #include "dtr/eval/report_json.h"
 #include "dtr/io/set_io.h"
+#include "pipeline/detail/cameras/given_cameras.h"
 #include "pipeline/set_rig.h"
 
 namespace dtr::pipeline {
@@ -88,6 +89,7 @@ SetValidation ValidateSet(const std::filesystem::path& folder, const DtrSet& set
   const auto rig = RigOfSet(set);
   const auto places = rig ? RigPlaces(set, sparse, *rig) : std::nullopt;
   if (places) report.tests.push_back(*places);
+  if (const auto given = GivenCamerasCheck(set)) report.tests.push_back(*given);
   for (const calib::PhotoValidation& validated_photo : validation.cameras) {
     const auto camera =
         std::find_if(report.cameras.begin(), report.cameras.end(),

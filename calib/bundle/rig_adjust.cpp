@@ -57,6 +57,43 @@ Frames FramesOf(const Bundle& bundle, const KnownRig& rig,
   return frames;
 }
 
+double DistanceOf(const Bundle& bundle, size_t a, size_t b) {
+  return (bundle.images[a].cam_from_world.TargetOriginInSource() -
+          bundle.images[b].cam_from_world.TargetOriginInSource())
+      .norm();
+}
+
+// Images of a frame should coincide: how far they do not, of the distance to the next frame.
+void RequireOneCentre(const Bundle& bundle, const Frames& frames, RigRefined& refined) {
+  std::vector<double> within, between;
+  for (size_t f = 0; f < frames.members.size(); ++f) {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const size_t a : frames.members[f]) {
+      for (const size_t b : frames.members[f]) {
+        if (b > a) within.push_back(DistanceOf(bundle, a, b));
+      }
+      for (size_t other = 0; other < frames.members.size(); ++other) {
+        if (other == f) continue;
+        for (const size_t b : frames.members[other]) {
+          nearest = std::min(nearest, DistanceOf(bundle, a, b));
+        }
+      }
+    }
+    if (std::isfinite(nearest)) between.push_back(nearest);
+  }
+  refined.scale = 1;
+  refined.pairs = static_cast<int>(within.size());
+  if (within.empty() || between.empty()) return;
+  refined.scale_spread = UpperMedian(within) / UpperMedian(between);
+  if (refined.scale_spread > kMaxScaleSpread) {
+    RejectRig(
+        fmt::format("the views of one panorama were found {:.0f} % of the way to the next panorama "
+                    "apart, in the median; are these whole panoramas, well stitched, of a still "
+                    "scene?",
+                    100 * refined.scale_spread));
+  }
+}
+
 void FindScale(const Bundle& bundle, const Frames& frames, RigRefined& refined) {
   std::vector<double> scales;
   for (const auto& members : frames.members) {
@@ -88,8 +125,29 @@ void FindScale(const Bundle& bundle, const Frames& frames, RigRefined& refined) 
   }
 }
 
+// What all say: single turns carry it less than single shifts.
+Eigen::Vector3d MeanCentre(const std::vector<Pose>& said) {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  for (const Pose& pose : said) {
+    centre += pose.TargetOriginInSource() / static_cast<double>(said.size());
+  }
+  return centre;
+}
+
+// What most say: views of the sky or of a blank wall may lie anywhere.
+Eigen::Vector3d MedianCentre(const std::vector<Pose>& said) {
+  Eigen::Vector3d centre;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    for (const Pose& pose : said) values.push_back(pose.TargetOriginInSource()[axis]);
+    centre[axis] = UpperMedian(values);
+  }
+  return centre;
+}
+
 // Of the poses that a frame's images say the rig has, the one nearest to the others.
-Pose RigOf(const Bundle& bundle, const Frames& frames, const std::vector<size_t>& members) {
+Pose RigOf(const Bundle& bundle, const Frames& frames, const std::vector<size_t>& members,
+           bool one_centre) {
   std::vector<Pose> said;
   for (const size_t i : members) {
     said.push_back(frames.images[i].cam_from_rig.Inverse() * bundle.images[i].cam_from_world);
@@ -105,11 +163,7 @@ Pose RigOf(const Bundle& bundle, const Frames& frames, const std::vector<size_t>
     }
   }
   Pose rig = said[best];
-  // Its place is the mean of what all say: single turns carry it less than single shifts.
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  for (const Pose& pose : said) {
-    centre += pose.TargetOriginInSource() / static_cast<double>(said.size());
-  }
+  const Eigen::Vector3d centre = one_centre ? MedianCentre(said) : MeanCentre(said);
   rig.translation = -(rig.rotation * centre);
   return rig;
 }
@@ -128,6 +182,24 @@ void RequireConverged(const Adjusted& adjusted, const char* what) {
 
 }  // namespace
 
+bool HasOneCentre(const KnownRig& rig) {
+  return std::all_of(rig.cam_from_rig.begin(), rig.cam_from_rig.end(), [&](const Pose& pose) {
+    return pose.TargetOriginInSource() == rig.cam_from_rig.front().TargetOriginInSource();
+  });
+}
+
+std::map<std::string, Pose> RigPosesOf(const SfmModel& model, const KnownRig& rig,
+                                       const std::map<std::string, RigPhoto>& photo_of) {
+  const Bundle bundle = BundleOf(WithLenses(model, rig, photo_of));
+  const Frames frames = FramesOf(bundle, rig, photo_of);
+  std::map<std::string, Pose> poses;
+  for (const auto& members : frames.members) {
+    poses[photo_of.at(bundle.images[members.front()].name).frame] =
+        RigOf(bundle, frames, members, true);
+  }
+  return poses;
+}
+
 RigRefined RefineRig(const SfmModel& model, const KnownRig& rig,
                      const std::map<std::string, RigPhoto>& photo_of, const Progress* progress) {
   const SfmModel known = WithLenses(model, rig, photo_of);
@@ -141,11 +213,17 @@ RigRefined RefineRig(const SfmModel& model, const KnownRig& rig,
   Bundle bundle = free.bundle;
   const Frames frames = FramesOf(bundle, rig, photo_of);
   refined.frames = static_cast<int>(frames.members.size());
-  FindScale(bundle, frames, refined);
-  Scale(refined.scale, bundle);
+  const bool one_centre = HasOneCentre(rig);
+  if (one_centre) {
+    RequireOneCentre(bundle, frames, refined);
+    bundle = BundleOf(known);  // whose views coincide already, also those of the sky
+  } else {
+    FindScale(bundle, frames, refined);
+    Scale(refined.scale, bundle);
+  }
   std::vector<Pose> rig_from_world;
   for (const auto& members : frames.members) {
-    rig_from_world.push_back(RigOf(bundle, frames, members));
+    rig_from_world.push_back(RigOf(bundle, frames, members, one_centre));
   }
   refined.adjusted = AdjustRig(bundle, frames.images, rig_from_world, options);
   RequireConverged(refined.adjusted, "with the rig's positions");

@@ -215,6 +215,21 @@ void RequireColmapsModels(std::span<const PosedImage> images) {
   }
 }
 
+// All matches that agree with a geometry of their pair.
+std::vector<calib::MatchedPair> MatchesIn(const Workspace& workspace) {
+  const sfm::ViewGraph graph = ReadViewGraph(workspace.database());
+  std::vector<calib::MatchedPair> pairs;
+  for (const sfm::PairGeometry& pair : graph.pairs) {
+    calib::MatchedPair& out = pairs.emplace_back();
+    out.a = pair.image_a;
+    out.b = pair.image_b;
+    const auto &in_a = graph.images[static_cast<size_t>(pair.image_a)].pixels,
+               &in_b = graph.images[static_cast<size_t>(pair.image_b)].pixels;
+    for (const auto& [a, b] : pair.matches) out.pixels.emplace_back(in_a[a], in_b[b]);
+  }
+  return pairs;
+}
+
 std::vector<std::string> ImagesWithoutPoints(const calib::SfmModel& model) {
   std::vector<std::string> names;
   for (const calib::SfmImage& image : model.images) {
@@ -227,6 +242,21 @@ std::vector<std::string> ImagesWithoutPoints(const calib::SfmModel& model) {
 }
 
 }  // namespace
+
+std::vector<calib::MatchedPair> MatchWithoutCameras(const fs::path& images_dir,
+                                                    std::span<const PosedImage> images,
+                                                    const fs::path& workspace_folder,
+                                                    const SfmOptions& given, Progress& progress) {
+  SfmOptions options = given;
+  options.engine = SfmEngine::kGlobal;
+  const std::vector<SfmImageInput> inputs = InputsOf(images);
+  Workspace workspace(workspace_folder, images_dir, inputs, "", ResolveThreads(options.threads),
+                      progress, options.engine);
+  SfmReport report;
+  FeaturesAndMatches(workspace, GroupCameras(workspace.images(), CameraModelOf(options), true),
+                     options, report);
+  return MatchesIn(workspace);
+}
 
 SfmResult TriangulateWithPoses(const fs::path& images_dir, std::span<const PosedImage> images,
                                const fs::path& workspace_folder, const SfmOptions& options,
@@ -250,6 +280,7 @@ SfmResult TriangulateWithPoses(const fs::path& images_dir, std::span<const Posed
     by_colmap ? Triangulate(workspace, known, options) : TriangulateHere(workspace, known);
   });
   result.model = ReadModel(workspace.folder() / "model");
+  if (!by_colmap) result.matches = MatchesIn(workspace);
   CompleteReport(workspace, result.model, result.report);
   result.report.not_registered = ImagesWithoutPoints(result.model);
   WriteReport(workspace.folder(), result.report);

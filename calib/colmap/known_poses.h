@@ -33,4 +33,12 @@ SfmResult TriangulateWithPoses(const std::filesystem::path& images_dir,
                                const std::filesystem::path& workspace, const SfmOptions& options,
                                Progress& progress);
 
+/// Matches of photos whose cameras are not believed: features and matching by calib/sfm in
+/// `workspace`, focal lengths by a vote. Indices into `images`, whose priors play no part. Throws
+/// as RunSfm does.
+std::vector<calib::MatchedPair> MatchWithoutCameras(const std::filesystem::path& images_dir,
+                                                    std::span<const PosedImage> images,
+                                                    const std::filesystem::path& workspace,
+                                                    const SfmOptions& options, Progress& progress);
+
 }  // namespace dtr::colmap

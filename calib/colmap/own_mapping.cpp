@@ -53,6 +53,7 @@ Undetermined UndeterminedOf(Workspace& workspace, const calib::SfmModel& model,
   refine.threads = options.threads;
   refine.seed = options.seed;
   refine.progress = &workspace.progress();
+  if (options.intrinsics_are_known) refine.known_lenses = model.cameras;
   const auto has = [&](const char* name) {
     return std::any_of(found.begin(), found.end(),
                        [&](const auto& degeneracy) { return degeneracy.name == name; });
@@ -145,8 +146,11 @@ std::vector<calib::SfmModel> AskColmap(
   }
 }
 
-Own MapOwn(Workspace& workspace, const SfmOptions& options, bool focals_hold) {
-  Own own{MapHere(workspace, options, {}, focals_hold), {}};
+Own MapOwn(Workspace& workspace, const std::vector<CameraGroup>& groups, const SfmOptions& options,
+           bool focals_hold) {
+  std::optional<GroupLenses> known;
+  if (options.intrinsics_are_known) known = LensesOf(workspace, groups);
+  Own own{MapHere(workspace, options, known, focals_hold), {}};
   if (own.Passes()) own.undetermined = UndeterminedOf(workspace, own.mapped.model, options);
   return own;
 }
@@ -169,7 +173,7 @@ bool AllFocalsAreExifs(const Workspace& workspace, const std::vector<CameraGroup
 bool MapsWithExifHeld(Workspace& workspace, const std::vector<CameraGroup>& groups,
                       const SfmOptions& options, Own& own) {
   if (!AllFocalsAreExifs(workspace, groups)) return false;
-  Own held = MapOwn(workspace, options, true);
+  Own held = MapOwn(workspace, groups, options, true);
   const bool is_whole = held.mapped.model.images.size() == workspace.images().size();
   if (!held.IsAllThereIs() || !is_whole) return false;
   workspace.progress().Note(
@@ -179,6 +183,12 @@ bool MapsWithExifHeld(Workspace& workspace, const std::vector<CameraGroup>& grou
   }
   own = std::move(held);
   return true;
+}
+
+bool HasStations(const Workspace& workspace) {
+  const auto& images = workspace.images();
+  return std::any_of(images.begin(), images.end(),
+                     [](const SfmImageInput& image) { return !image.station.empty(); });
 }
 
 // Whether COLMAP's mapper is to be asked: it works, or a note says why not.
@@ -197,8 +207,16 @@ bool CanAsk(Workspace& workspace, const SfmOptions& options, const std::string& 
 std::vector<calib::SfmModel> MapOrFallBack(
     Workspace& workspace, const std::vector<CameraGroup>& groups, const SfmOptions& options,
     const std::function<std::vector<calib::SfmModel>()>& by_colmap) {
-  Own own = MapOwn(workspace, options, false);
-  const bool held = !own.IsResult() && MapsWithExifHeld(workspace, groups, options, own);
+  Own own = MapOwn(workspace, groups, options, false);
+  if (HasStations(workspace) && !own.mapped.model.images.empty()) {
+    // Views of a plain ceiling alone may stand anywhere. What their stations make of them is tested
+    // (PointsOfMatches), not this.
+    own.mapped.why_not.clear();
+    WriteNote(workspace, own.mapped, false, "");
+    return {std::move(own.mapped.model)};
+  }
+  const bool held = !own.IsResult() && !options.intrinsics_are_known &&
+                    MapsWithExifHeld(workspace, groups, options, own);
   const bool passes = own.Passes();
   const GloballyMapped& ours = own.mapped;
   if (held || (own.IsAllThereIs() && ours.model.images.size() == workspace.images().size())) {

@@ -64,13 +64,19 @@ void CreateDatabase(const Workspace& workspace, const fs::path& database,
 }
 
 // The pairs to be matched, or chosen from; nothing: all.
-std::optional<std::vector<std::pair<int, int>>> PairsFor(size_t photos, Matching matching,
+std::optional<std::vector<std::pair<int, int>>> PairsFor(const std::vector<SfmImageInput>& images,
+                                                         Matching matching,
                                                          const std::optional<ImagePairs>& allowed) {
   constexpr size_t kNeighbours = 10;  // of a sequence, and as many at distances of powers of two
+  const size_t photos = images.size();
+  const bool stations = std::any_of(images.begin(), images.end(), [](const SfmImageInput& image) {
+    return !image.station.empty();
+  });
   const auto may = [&](size_t a, size_t b) {
+    if (!images[a].station.empty() && images[a].station == images[b].station) return false;
     return !allowed || std::binary_search(allowed->begin(), allowed->end(), std::pair(a, b));
   };
-  if (matching != Matching::kSequential && !allowed) return std::nullopt;
+  if (matching != Matching::kSequential && !allowed && !stations) return std::nullopt;
   std::vector<std::pair<int, int>> pairs;
   for (size_t a = 0; a < photos; ++a) {
     for (size_t b = a + 1; b < photos; ++b) {
@@ -169,7 +175,7 @@ void OwnMatches(Workspace& workspace, const fs::path& features,
   match.threads = workspace.threads();
   match.seed = options.seed;
   match.lens_is_known.assign(known.lenses.size(), known_lenses);
-  match.pairs = PairsFor(photos.size(), matching, allowed);
+  match.pairs = PairsFor(workspace.images(), matching, allowed);
   match.preselect = matching == Matching::kPreselected;
   match.load_descriptors = [&](int photo, size_t first) {
     const auto i = static_cast<size_t>(photo);

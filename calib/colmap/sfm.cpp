@@ -11,8 +11,11 @@
 #include "calib/colmap/own_mapping.h"
 #include "calib/colmap/own_steps.h"
 #include "calib/colmap/parallax.h"
+#include "calib/colmap/point_colours.h"
 #include "calib/colmap/sfm_steps.h"
 #include "calib/colmap/without_camera.h"
+#include "calib/sfm/mapping/model_check.h"
+#include "calib/sfm/mapping/triangulate.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/parallel_for.h"
@@ -109,6 +112,9 @@ std::vector<calib::SfmModel> MadeIn(Workspace& workspace, const fs::path& models
                                     const SfmOptions& options, Mapping mapping) {
   RemoveAll(models);
   MakeFolder(models);
+  if (options.intrinsics_are_known && mapping == Mapping::kFree) {
+    mapping = Mapping::kFixedIntrinsics;
+  }
   return Map(workspace, models, options.seed, mapping) ? ModelsIn(workspace, models)
                                                        : std::vector<calib::SfmModel>();
 }
@@ -192,6 +198,7 @@ void FixedMappingStep(Workspace& workspace, const std::vector<CameraGroup>& grou
 std::string MappingInputs(const SfmOptions& options) {
   std::string inputs = fmt::format("seed {}", options.seed);
   if (options.engine != SfmEngine::kColmap) inputs += fmt::format(" {}", NameOf(options.engine));
+  if (options.intrinsics_are_known) inputs += " known intrinsics";
   if (options.engine == SfmEngine::kAuto) {
     const Program::State colmap = Program::Find();
     inputs += colmap.Works() ? " " + colmap.version : " without COLMAP";
@@ -224,7 +231,7 @@ SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> imag
                       progress, options.engine);
   const auto groups = GroupCameras(workspace.images(), lens, options.share_intrinsics_within_group);
   SfmResult result;
-  FeaturesAndMatches(workspace, groups, options, result.report);
+  FeaturesAndMatches(workspace, groups, options, result.report, {}, options.intrinsics_are_known);
   workspace.Step("mapping", MappingInputs(options),
                  [&] { MappingStep(workspace, groups, options); });
   result.model = ReadModel(workspace.folder() / "model");
@@ -250,6 +257,40 @@ SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> imag
         fmt::format("parallax and photos without a camera cannot be analysed: {}", error.what()));
   }
   return result;
+}
+
+calib::SfmModel PointsOfMatches(const fs::path& images_dir, std::span<const SfmImageInput> images,
+                                const fs::path& workspace_folder, const SfmOptions& options,
+                                const calib::LensCamera& lens,
+                                const std::map<std::string, Pose>& cam_from_world,
+                                Progress& progress) {
+  Workspace workspace(workspace_folder, images_dir, images, "", ResolveThreads(options.threads),
+                      progress, options.engine);
+  sfm::ViewGraph graph = ReadViewGraph(workspace.database());
+  std::vector<Pose> poses;
+  std::vector<bool> posed;
+  for (sfm::GraphImage& image : graph.images) {
+    image.name = workspace.NameOfAlias(image.name);
+    const auto found = cam_from_world.find(image.name);
+    posed.push_back(found != cam_from_world.end());
+    poses.push_back(posed.back() ? found->second : Pose{});
+  }
+  for (calib::LensCamera& camera : graph.cameras) camera = lens;
+  std::erase_if(graph.pairs, [&](const sfm::PairGeometry& pair) {
+    return !posed[static_cast<size_t>(pair.image_a)] || !posed[static_cast<size_t>(pair.image_b)];
+  });
+  calib::SfmModel model = sfm::TriangulateMatches(graph, poses, workspace.threads());
+  if (const std::string why = sfm::WhyRigsContradicted(graph, model, workspace.threads());
+      !why.empty()) {
+    throw Error(fmt::format(
+        "structure from motion: expected panoramas that determine their cameras, found that {}; "
+        "panoramas must show the same things from several positions",
+        why));
+  }
+  std::erase_if(model.images,
+                [&](const calib::SfmImage& image) { return !cam_from_world.contains(image.name); });
+  ColourPoints(workspace, model);
+  return model;
 }
 
 std::optional<SfmResult> MapWithFixedIntrinsics(const fs::path& images_dir,

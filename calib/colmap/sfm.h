@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/matched_pair.h"
 #include "calib/sfm_model.h"
 #include "dtr/base/progress.h"
 
@@ -20,6 +21,9 @@ struct SfmImageInput {
   std::optional<double> focal_prior_px;  ///< empty: COLMAP's own guess from EXIF, else 1.2 w
   std::string camera_group = {};         ///< photos of one group and size share intrinsics
   std::filesystem::path mask_file = {};  ///< no features where this image is black; empty: none
+  /// Photos of one station (views of a panorama) were taken from one point: without parallax they
+  /// tell nothing of each other, and are not matched. Empty: of none.
+  std::string station = {};
 };
 
 /// Which pairs of photos are matched in full.
@@ -73,6 +77,9 @@ struct SfmOptions {
   /// whose fx and fy then differ by 0.8 %: more freedom than a sensor of square pixels has.
   std::string lens_model = "RADIAL";
   bool share_intrinsics_within_group = true;
+  /// The priors are exact, with no distortion, and hold: views made of panoramas. Of the engines
+  /// kGlobal and kAuto.
+  bool intrinsics_are_known = false;
 };
 
 /// "auto", "exhaustive", "preselected", "sequential".
@@ -110,6 +117,9 @@ struct SfmReport {
 struct SfmResult {
   calib::SfmModel model;
   SfmReport report;
+  /// Of TriangulateWithPoses by calib/sfm: what was matched, whether or not the poses explain it;
+  /// indices into model.images.
+  std::vector<calib::MatchedPair> matches = {};
 };
 
 /// Features, matching and mapping in `workspace` (made when absent), on the CPU, headless.
@@ -135,6 +145,17 @@ std::optional<SfmResult> MapWithFixedIntrinsics(const std::filesystem::path& ima
                                                 const SfmOptions& options, Progress& progress);
 /// The folder of its model in the workspace.
 inline constexpr char kFixedModel[] = "fixed/model";
+
+/// Where RunSfm of the same arguments has finished: a model of the photos with these cameras and
+/// poses (by name; others are left out), unchanged, and all points that its matches then determine
+/// (sfm/mapping/triangulate.h). `lens`: of all photos. Throws as RunSfm does, and Error where the
+/// matches contradict it (sfm/mapping/model_check.h).
+calib::SfmModel PointsOfMatches(const std::filesystem::path& images_dir,
+                                std::span<const SfmImageInput> images,
+                                const std::filesystem::path& workspace, const SfmOptions& options,
+                                const calib::LensCamera& lens,
+                                const std::map<std::string, Pose>& cam_from_world,
+                                Progress& progress);
 
 /// Mean distance (px) between features and their points' projections; 0 without observations.
 double MeanReprojectionErrorPx(const calib::SfmModel& model);

@@ -61,6 +61,9 @@ void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& gr
   });
   auto text = fmt::format("matching {} seed {}", static_cast<int>(report.matching), options.seed);
   if (known_lenses && options.engine != SfmEngine::kColmap) text += " known lenses";
+  for (const SfmImageInput& image : workspace.images()) {
+    if (!image.station.empty()) text += " " + image.station;
+  }
   if (allowed) {
     for (const auto& [a, b] : *allowed) text += fmt::format(" {}-{}", a, b);
   }

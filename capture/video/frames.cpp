@@ -128,6 +128,8 @@ bool VideoReader::PromisesMoreThan(int frames) const {
 
 int VideoReader::frames_so_far() const { return parts_->decoder.count(); }
 
+std::string VideoReader::Projection() const { return parts_->decoder.Projection(); }
+
 double VideoReader::frames_per_second() const { return parts_->decoder.frames_per_second(); }
 
 std::string VideoReader::WhyIncomplete() const {

@@ -37,6 +37,8 @@ class VideoReader {
   /// Frames of the file so far, damaged ones included.
   int frames_so_far() const;
   double frames_per_second() const;
+  /// Of spherical video: "equirectangular" or another word; empty where the file states none.
+  std::string Projection() const;
 
   /// Of the frames so far: one line for each thing that was converted, or that is not used.
   const std::vector<std::string>& remarks() const { return remarks_; }

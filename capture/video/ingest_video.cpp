@@ -291,8 +291,14 @@ Capture IngestVideos(const Videos& videos, const VideoOptions& options, const fs
   Capture capture = IngestPhotos(
       folder, {.sort = false, .threads = options.threads, .memory_gb = options.memory_gb},
       progress);
+  std::map<std::string, std::string> projections;
+  for (const fs::path& video : videos) {
+    projections[video.filename().string()] = VideoReader(video).Projection();
+  }
   for (Photo& photo : capture.photos) {
     photo.video_frame = origins.at(photo.name);
+    const std::string& projection = projections.at(photo.video_frame->video);
+    if (!projection.empty()) photo.panorama.emplace().projection = projection;
     photo.camera_group =
         fmt::format("video {}|{}x{}", photo.video_frame->video, photo.width_px, photo.height_px);
   }

@@ -14,6 +14,7 @@
 
 extern "C" {
 #include <libavutil/dovi_meta.h>
+#include <libavutil/spherical.h>
 }
 
 namespace dtr::capture {
@@ -233,6 +234,20 @@ std::optional<DisplayMatrix> VideoDecoder::MatrixOf(const AVFrame& frame) const 
   size_t bytes = 0;
   const void* data = av_stream_get_side_data(&stream(), AV_PKT_DATA_DISPLAYMATRIX, &bytes);
   return MatrixIn(data, bytes);
+}
+
+std::string VideoDecoder::Projection() const {
+  size_t bytes = 0;
+  const auto* data = av_stream_get_side_data(&stream(), AV_PKT_DATA_SPHERICAL, &bytes);
+  if (data == nullptr || bytes < sizeof(AVSphericalMapping)) return "";
+  switch (reinterpret_cast<const AVSphericalMapping*>(data)->projection) {
+    case AV_SPHERICAL_EQUIRECTANGULAR:
+      return "equirectangular";
+    case AV_SPHERICAL_CUBEMAP:
+      return "cubemap";
+    default:
+      return "part of a sphere";
+  }
 }
 
 bool VideoDecoder::NeedsDolbyVision() const {

@@ -34,6 +34,8 @@ class VideoDecoder {
   /// The matrix of this frame (H.264 and HEVC can hold one), else of the track; nothing where
   /// neither has one.
   std::optional<DisplayMatrix> MatrixOf(const AVFrame& frame) const;
+  /// Of spherical video: "equirectangular" or another word; empty where the file states none.
+  std::string Projection() const;
   /// Dolby Vision without a base layer that others can show.
   bool NeedsDolbyVision() const;
 

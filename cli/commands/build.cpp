@@ -6,6 +6,7 @@
 #include "cli/depth_options.h"
 #include "cli/metre_options.h"
 #include "cli/not_registered.h"
+#include "cli/panorama_options.h"
 #include "cli/sfm_options.h"
 #include "cli/video_options.h"
 #include "pipeline/build.h"
@@ -51,6 +52,7 @@ void AddBuildCommand(CLI::App& app) {
             ->required()
             ->type_name("SET.dtr");
         AddVideoOptions(command, options->video);
+        AddPanoramaOption(command, options->panoramas);
         command
             .add_option("--holdout", options->holdout,
                         "Photos held out from depth and textures, to measure with")
@@ -80,8 +82,13 @@ void AddBuildCommand(CLI::App& app) {
                         "Calibration of the rig that took all photos, of `dtr calibrate rig`: its "
                         "intrinsics, positions and scale are fixed")
             ->type_name("RIG.json");
-        command.add_flag("!--no-refine", options->refine,
-                         "Take COLMAP's cameras as they are, without bundle adjustment");
+        CLI::Option* no_refine =
+            command.add_flag("!--no-refine", options->refine,
+                             "Take COLMAP's cameras as they are, without bundle adjustment");
+        command
+            .add_flag("--refine", options->refine_poses,
+                      "Adjust the cameras of --poses, where held-out observations gain")
+            ->excludes(no_refine);
         AddSfmOptions(command, options->sfm);
         auto words = std::make_shared<MetreWords>();
         AddMetreOptions(command, *AddGpsFlag(command, options->metres.gps), *words);

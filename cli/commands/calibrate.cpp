@@ -4,6 +4,7 @@
 
 #include "calib/colmap/model_io.h"
 #include "capture/ingest.h"
+#include "capture/split_panoramas.h"
 #include "capture/store.h"
 #include "cli/command.h"
 #include "cli/commands/calibrate_scale.h"
@@ -42,9 +43,15 @@ int RunCalibratePhotos(const CalibrateArguments& options, const Context& context
   // Before any photo is read: what is missing or wrong must not cost their time.
   if (!options.lens.empty()) calibrate.lens = pipeline::ReadLens(options.lens);
   pipeline::RequireCalibration({}, options.sfm);
-  const auto photos = capture::IngestPhotos(
+  auto photos = capture::IngestPhotos(
       options.photos, {.threads = context.common.threads, .memory_gb = options.memory_gb},
       context.console);
+  if (capture::ArePanoramas(photos, capture::PanoramaUse::kAuto)) {
+    throw UsageError(fmt::format(
+        "{}: holds 360 degree panoramas; split them first: dtr capture {} -o DIR, then dtr "
+        "calibrate photos DIR",
+        options.photos.string(), options.photos.string()));
+  }
   capture::RequireEnoughPhotos(photos, options.photos);
   pipeline::RequireMetres(metres, photos, options.photos.string());
   calibrate.metres = metres;

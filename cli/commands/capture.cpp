@@ -6,6 +6,7 @@
 #include "capture/capture.h"
 #include "capture/contents_json.h"
 #include "cli/command.h"
+#include "cli/panorama_options.h"
 #include "cli/video_options.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -21,6 +22,7 @@ using Json = nlohmann::ordered_json;
 struct CaptureArguments {
   fs::path source, output;
   capture::VideoOptions video;
+  capture::PanoramaUse panoramas = capture::PanoramaUse::kAuto;
   std::vector<std::string> drop;
   bool force = false;
 };
@@ -35,6 +37,10 @@ Json ToJson(const capture::Photo& photo) {
     json["video"] = frame->video;
     json["frame"] = frame->number;
     json["time_s"] = frame->time_s;
+  }
+  if (const auto& face = photo.face) {
+    json["panorama"] = face->panorama;
+    json["panorama_view"] = face->face;
   }
   if (const auto& screening = photo.screening) {
     json["sharpness"] = screening->sharpness;
@@ -103,8 +109,8 @@ int Run(const CaptureArguments& options, const Context& context) {
   capture::VideoOptions video = options.video;
   video.threads = context.common.threads;
   capture::Capture ingested = pipeline::Ingest(
-      options.source, video, [&] { return writer.Open() / capture::kFramesFolder; },
-      context.console);
+      options.source, video, options.panoramas,
+      [&] { return writer.Open() / capture::kFramesFolder; }, context.console);
   capture::DropFaulty(ingested, drop);
   if (ingested.photos.empty()) {
     throw Error(fmt::format(
@@ -142,6 +148,7 @@ void AddCaptureCommand(CLI::App& app) {
                    ->delimiter(',')
                    ->type_name("FAULT,...");
                AddVideoOptions(command, options->video);
+               AddPanoramaOption(command, options->panoramas);
                AddMemoryOption(command, options->video.memory_gb,
                                "Memory for photos that are looked at at a time [4]");
                command.add_flag("--force", options->force, "Replace a capture that exists");

@@ -57,6 +57,9 @@ void DeclareMakeOptions(CLI::App& command, MakeOptions& options) {
   command.add_option("--views", spec.views, "Number of photos [16]")->type_name("N");
   command.add_option("--width", spec.width_px, "Photo width [960]")->type_name("PX");
   command.add_option("--height", spec.height_px, "Photo height [640]")->type_name("PX");
+  command.add_flag("--panoramas", spec.panoramas,
+                   "360 degree panoramas of that width, half as high, with the views of a cube "
+                   "around each");
   command.add_option("--noise", spec.noise, "Standard deviation of pixel noise, 8-bit levels [0]");
   command
       .add_option(

@@ -4,46 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <string_view>
+
+#include "dtr/io/file_boxes.h"
 
 namespace dtr::io {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr std::uint64_t kLargestBox = 64 << 20;  // of what is read into memory
-
-// FileBytes of a file; what lies beyond its end is empty.
-class FileBytes {
- public:
-  explicit FileBytes(const fs::path& file) : in_(file, std::ios::binary) {
-    std::error_code error;
-    size_ = fs::file_size(file, error);
-    if (error) size_ = 0;
-  }
-  std::uint64_t size() const { return size_; }
-  std::string At(std::uint64_t offset, std::uint64_t count) {
-    if (offset > size_ || count > size_ - offset || count > kLargestBox) return {};
-    std::string bytes(static_cast<size_t>(count), '\0');
-    in_.clear();
-    in_.seekg(static_cast<std::streamoff>(offset));
-    in_.read(bytes.data(), static_cast<std::streamsize>(count));
-    return in_ ? bytes : std::string();
-  }
-
- private:
-  std::ifstream in_;
-  std::uint64_t size_ = 0;
-};
-
-// Big-endian number of so many bytes; 0 where they are not there.
-std::uint64_t Big(std::string_view bytes, size_t at, size_t count) {
-  if (at > bytes.size() || count > bytes.size() - at) return 0;
-  std::uint64_t value = 0;
-  for (size_t i = 0; i < count; ++i) value = value << 8 | static_cast<unsigned char>(bytes[at + i]);
-  return value;
-}
-
 void State(int primaries, int transfer, FileColours& colours) {
   colours.coding = CodingOfH273(primaries, transfer);
   if (colours.coding) return;
@@ -129,41 +97,6 @@ FileColours WebpColours(FileBytes& file) {
   return colours;
 }
 
-// A box of ISO 14496-12: what lies in it.
-struct Box {
-  std::string type;
-  std::uint64_t begin = 0, end = 0;
-};
-
-std::vector<Box> BoxesIn(FileBytes& file, std::uint64_t begin, std::uint64_t end) {
-  constexpr size_t kMaxBoxes = 10'000;
-  std::vector<Box> boxes;
-  for (std::uint64_t at = begin; at + 8 <= end && boxes.size() < kMaxBoxes;) {
-    const std::string head = file.At(at, std::min<std::uint64_t>(16, end - at));
-    if (head.size() < 8) break;
-    std::uint64_t size = Big(head, 0, 4), header = 8;
-    if (size == 1 && head.size() == 16) {
-      size = Big(head, 8, 8);
-      header = 16;
-    }
-    if (size == 0) size = end - at;
-    if (size < header || size > end - at) break;
-    boxes.push_back({head.substr(4, 4), at + header, at + size});
-    at += size;
-  }
-  return boxes;
-}
-
-const Box* Find(const std::vector<Box>& boxes, std::string_view type) {
-  const auto found =
-      std::find_if(boxes.begin(), boxes.end(), [&](const Box& box) { return box.type == type; });
-  return found == boxes.end() ? nullptr : &*found;
-}
-
-std::string ContentOf(FileBytes& file, const Box* box) {
-  return box == nullptr ? std::string() : file.At(box->begin, box->end - box->begin);
-}
-
 // The properties, counted from 1, of an item (ISO 23008-12, 9.3.2, "ipma").
 std::vector<size_t> PropertiesOf(const std::string& ipma, std::uint64_t item) {
   const bool long_ids = Big(ipma, 0, 1) >= 1, long_indices = (Big(ipma, 3, 1) & 1) != 0;
@@ -191,18 +124,18 @@ FileColours HeifColours(FileBytes& file) {
   constexpr std::uint64_t kFullBox = 4;  // version and flags
   FileColours colours;
   const auto top = BoxesIn(file, 0, file.size());
-  const Box* meta = Find(top, "meta");
+  const Box* meta = FindBox(top, "meta");
   if (meta == nullptr) return colours;
   const auto in_meta = BoxesIn(file, meta->begin + kFullBox, meta->end);
-  const std::string primary = ContentOf(file, Find(in_meta, "pitm"));
-  const Box* iprp = Find(in_meta, "iprp");
+  const std::string primary = ContentOf(file, FindBox(in_meta, "pitm"));
+  const Box* iprp = FindBox(in_meta, "iprp");
   if (primary.size() < 6 || iprp == nullptr) return colours;
   const auto in_iprp = BoxesIn(file, iprp->begin, iprp->end);
-  const Box* ipco = Find(in_iprp, "ipco");
+  const Box* ipco = FindBox(in_iprp, "ipco");
   if (ipco == nullptr) return colours;
   const auto properties = BoxesIn(file, ipco->begin, ipco->end);
   const std::uint64_t item = Big(primary, 4, Big(primary, 0, 1) == 0 ? 2 : 4);
-  for (const size_t index : PropertiesOf(ContentOf(file, Find(in_iprp, "ipma")), item)) {
+  for (const size_t index : PropertiesOf(ContentOf(file, FindBox(in_iprp, "ipma")), item)) {
     if (index == 0 || index > properties.size() || properties[index - 1].type != "colr") continue;
     const std::string content = ContentOf(file, &properties[index - 1]);
     if (content.starts_with("nclx") && content.size() >= 8) {

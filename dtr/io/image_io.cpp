@@ -14,6 +14,7 @@
 #include "dtr/io/alpha.h"
 #include "dtr/io/colour_coding.h"
 #include "dtr/io/file_colours.h"
+#include "dtr/io/heif_exif.h"
 #include "dtr/io/jpeg_cmyk.h"
 #include "dtr/io/oiio_files.h"
 #include "dtr/io/photo_colours.h"
@@ -70,6 +71,21 @@ std::optional<double> FocalPlanePxPerMm(const ImageSpec& spec) {
   if (unit == 2) return *resolution / 25.4;
   if (unit == 3) return *resolution / 10.0;
   return std::nullopt;
+}
+
+// LibRaw's multipliers, relative to green.
+std::optional<RawBalance> RawBalanceOf(const ImageSpec& spec) {
+  const OIIO::ParamValue* value = spec.find_attribute("raw:cam_mul");
+  if (value == nullptr || value->type().basevalues() < 3) return std::nullopt;
+  RawBalance balance{};
+  const double green = value->get_float_indexed(1);
+  for (int c = 0; c < 3; ++c) {
+    balance[static_cast<size_t>(c)] = value->get_float_indexed(c) / green;
+    if (!(balance[static_cast<size_t>(c)] > 0) || !std::isfinite(balance[static_cast<size_t>(c)])) {
+      return std::nullopt;
+    }
+  }
+  return balance;
 }
 
 int ExifOrientationOf(const ImageSpec& spec) {
@@ -143,8 +159,11 @@ bool IsCmyk(const ImageSpec& spec) {
 // The opened image's spec, with EXIF that OpenImageIO left in the file.
 ImageSpec SpecOf(const OIIO::ImageInput& in, const fs::path& file) {
   ImageSpec spec = in.spec();
-  const std::string exif = ReadWebpExif(file);
+  const bool is_heif = IsHeif(file);
+  const std::string exif = is_heif ? ReadHeifExif(file) : ReadWebpExif(file);
   if (!exif.empty()) OIIO::decode_exif(OIIO::string_view(exif), spec);
+  // HEIF turns images by properties of its own, which the decoder applies (ISO 23008-12, 6.5.10).
+  if (is_heif) spec.attribute("Orientation", 1);
   return spec;
 }
 
@@ -187,6 +206,8 @@ ImageHeader ReadImageHeader(const fs::path& file) {
   header.lens_model = spec.get_string_attribute("Exif:LensModel");
   header.date_time = spec.get_string_attribute("Exif:DateTimeOriginal");
   header.gps = GpsOf(spec);
+  header.panorama = ReadPanoramaXmp(file);
+  header.raw_balance = RawBalanceOf(spec);
   const PhotoColours colours(spec, in->format_name(), file);
   header.converted = colours.converts();
   header.remarks = colours.remarks();
@@ -199,7 +220,7 @@ ImageRgb8 ReadImage(const fs::path& file, const ImageReadOptions& options) {
 }
 
 ImageAndMask ReadImageAndMask(const fs::path& file, const ImageReadOptions& options) {
-  const auto in = OpenImage(file, options.limit_px);
+  const auto in = OpenImage(file, options.limit_px, options.raw_balance);
   std::optional<Grid<std::uint8_t>> plain;
   if (IsCmyk(in->spec())) plain = ReadPlainCmykJpeg(file);
   const Alpha alpha(*in, file);

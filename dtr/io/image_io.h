@@ -1,11 +1,13 @@
 // dtr/io/image_io.h -- photos and masks in, images out.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "dtr/io/panorama_xmp.h"
 #include "dtr/types/grid.h"
 
 namespace dtr::io {
@@ -18,6 +20,9 @@ struct GpsPosition {
   /// Radius that the place is known to on the map (EXIF GPSHPositioningError), where it is said.
   std::optional<double> horizontal_error_m = std::nullopt;
 };
+
+/// White balance of a raw file: factors of red, green (1) and blue of the sensor.
+using RawBalance = std::array<double, 3>;
 
 /// What a file says about its image, before any pixel is read.
 struct ImageHeader {
@@ -35,6 +40,9 @@ struct ImageHeader {
   std::string make, model, lens_model;
   std::string date_time;  ///< "YYYY:MM:DD HH:MM:SS" of the exposure, or empty
   std::optional<GpsPosition> gps;
+  std::optional<PanoramaXmp> panorama;  ///< what it states about being a 360 degree panorama
+  /// Of raw files: what the camera chose for this photo.
+  std::optional<RawBalance> raw_balance;
   bool converted = false;  ///< integer samples that are not sRGB's: ReadImage converts them
   /// One line for each thing that the file holds or states and that ReadImage does not use.
   std::vector<std::string> remarks;
@@ -52,7 +60,9 @@ bool HoldsPhoto(const std::filesystem::path& file);
 inline constexpr std::uint64_t kImageLimitPx = 400'000'000;
 
 struct ImageReadOptions {
-  bool apply_exif_orientation = false;     ///< turn the image upright
+  bool apply_exif_orientation = false;  ///< turn the image upright
+  /// Of raw files: in place of what the camera chose for each photo; of others nothing.
+  std::optional<RawBalance> raw_balance = {};
   std::uint64_t limit_px = kImageLimitPx;  ///< larger images are rejected before allocation
 };
 
@@ -65,6 +75,7 @@ struct ImageReadOptions {
 /// those of other files are taken as sRGB-coded. Float and half samples (EXR, HDR, float TIFF) are
 /// taken as linear light in the primaries of the file, else sRGB's. All are clipped to [0, 1] and
 /// rounded to 8 bits.
+/// Raw files are developed by LibRaw without automatic brightness.
 /// NaN and infinity among them are rejected. Only the first image of a file is read.
 /// Throws Error when the file is no image, is damaged or cut short, or is larger than the limit.
 ImageRgb8 ReadImage(const std::filesystem::path& file, const ImageReadOptions& options = {});

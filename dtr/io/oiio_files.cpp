@@ -2,6 +2,7 @@
 
 #include <OpenImageIO/filesystem.h>
 
+#include <array>
 #include <mutex>
 #include <vector>
 
@@ -36,7 +37,8 @@ constexpr int kPngLevel = 2;
 
 }  // namespace
 
-std::unique_ptr<OIIO::ImageInput> OpenImage(const fs::path& file, std::uint64_t limit_px) {
+std::unique_ptr<OIIO::ImageInput> OpenImage(const fs::path& file, std::uint64_t limit_px,
+                                            const std::optional<RawBalance>& raw_balance) {
   SetUpOnce();
   std::error_code error;
   if (!fs::is_regular_file(file, error)) {
@@ -47,6 +49,16 @@ std::unique_ptr<OIIO::ImageInput> OpenImage(const fs::path& file, std::uint64_t 
   ExpectWholeFile(file);
   OIIO::ImageSpec wishes;  // raw colours: alpha is dropped, not multiplied in
   wishes.attribute("oiio:UnassociatedAlpha", 1);
+  // Of raw files: brightness as exposed, for neighbouring photos must show one surface alike.
+  wishes.attribute("raw:auto_bright", 0);
+  wishes.attribute("raw:adjust_maximum_thr", 0.0f);
+  if (raw_balance) {
+    const std::array<float, 4> factors{
+        static_cast<float>((*raw_balance)[0]), static_cast<float>((*raw_balance)[1]),
+        static_cast<float>((*raw_balance)[2]), static_cast<float>((*raw_balance)[1])};
+    wishes.attribute("raw:use_camera_wb", 0);
+    wishes.attribute("raw:user_mul", OIIO::TypeDesc(OIIO::TypeDesc::FLOAT, 4), factors.data());
+  }
   auto in = OIIO::ImageInput::open(file.string(), &wishes);
   if (!in) throw Error(file.string() + ": no readable image: " + OneLine(OIIO::geterror()));
   const OIIO::ImageSpec& spec = in->spec();

@@ -5,14 +5,18 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
+
+#include "dtr/io/image_io.h"
 
 namespace dtr::io {
 
-/// Opens an image. Throws Error with one line when it cannot be opened, is a PNG cut short, or has
-/// no pixels or more than `limit_px`.
+/// Opens an image. `raw_balance`: see ImageReadOptions. Throws Error with one line when it cannot
+/// be opened, is a PNG cut short, or has no pixels or more than `limit_px`.
 std::unique_ptr<OIIO::ImageInput> OpenImage(const std::filesystem::path& file,
-                                            std::uint64_t limit_px);
+                                            std::uint64_t limit_px,
+                                            const std::optional<RawBalance>& raw_balance = {});
 
 /// Reads channels [0, channels) of the first image into `pixels`, which must have room. Any word of
 /// complaint by the decoder is an Error: half-grey photos must not pass for whole ones.

@@ -14,6 +14,7 @@
 #include "dtr/io/depth_io.h"
 #include "dtr/io/formats/cameras_json.h"
 #include "dtr/io/image_io.h"
+#include "dtr/types/panorama.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::datasets {
@@ -182,6 +183,56 @@ TEST(MakeDataset, LensBendsThePhotosAndLeavesTruthAlone) {
     if (name.starts_with("images/") || name == "dataset.json" || name == "SOURCE.md") continue;
     EXPECT_EQ(content, bent.at(name)) << name;
   }
+}
+
+TEST(MakeDataset, PanoramasAndTheViewsAroundThemShowTheSame) {
+  const testing::TemporaryFolder folder;
+  DatasetSpec spec = Small("room");
+  spec.panoramas = true;
+  spec.views = 2;
+  spec.width_px = 256;
+  spec.supersampling = 3;
+  spec.jpeg_quality = 100;
+  Make(spec, folder / "set");
+  EXPECT_EQ(FormatSpecJson(ParseSpecJson(FormatSpecJson(spec), "spec")), FormatSpecJson(spec));
+  const io::CameraList list = io::ReadCamerasJson(folder / "set/cameras.json");
+  ASSERT_EQ(list.cameras.size(), 12u);
+  const ImageRgb8 whole = io::ReadImage(folder / "set/panoramas/0001.jpg");
+  ASSERT_EQ(whole.width(), 256);
+  ASSERT_EQ(whole.height(), 128);
+  EXPECT_TRUE(io::ReadImageHeader(folder / "set/panoramas/0001.jpg").panorama);
+  const Panorama panorama{256, 128, 0, 0};
+  for (const PanoramaFace& face : PanoramaFaces()) {
+    const ImageRgb8 view = io::ReadImage(folder / "set/images" / face.name / "0001.jpg");
+    const PinholeCamera camera = FaceCamera(view.width());
+    double difference = 0, contrast = 0;
+    int count = 0;
+    // Around the middle of a view both have the same resolution.
+    for (int y = view.height() / 3; y < 2 * view.height() / 3; ++y) {
+      for (int x = view.width() / 3; x < 2 * view.width() / 3; ++x) {
+        const Eigen::Vector2d pixel = panorama.PixelFromDirection(
+            face.cam_from_panorama.transpose() * camera.RayFromPixel({x + 0.5, y + 0.5}));
+        const int u = std::min(255, static_cast<int>(pixel.x()));
+        const int v = std::min(127, static_cast<int>(pixel.y()));
+        difference += std::abs(view(x, y, 1) - whole(u, v, 1));
+        contrast += std::abs(view(x, y, 1) - whole((u + 100) % 256, v, 1));
+        ++count;
+      }
+    }
+    // The nearest pixel lies up to half a pixel aside; anywhere else the image is another.
+    EXPECT_LT(difference / count, 8) << face.name;
+    EXPECT_LT(difference, 0.5 * contrast) << face.name;
+    const Grid<float> depth = io::ReadFloatGrid(folder / "set/depth" / face.name / "0001.exr");
+    EXPECT_EQ(depth.width(), view.width());
+    EXPECT_EQ(std::count(depth.data().begin(), depth.data().end(), 0.0f), 0);
+  }
+  // All views of a panorama stand in one point.
+  EXPECT_LT((list.cameras[0].cam_from_world.TargetOriginInSource() -
+             list.cameras[5].cam_from_world.TargetOriginInSource())
+                .norm(),
+            1e-12);
+  spec.width_px = 255;
+  EXPECT_THROW(Make(spec, folder / "odd"), UsageError);
 }
 
 TEST(MakeDataset, WrongRequestsAreRejectedBeforeAnyFileIsWritten) {

@@ -79,6 +79,17 @@ double ExplainedShare(const ViewGraph& graph, const MapCameras& cameras,
 
 }  // namespace
 
+std::string WhyRigsContradicted(const ViewGraph& graph, const calib::SfmModel& model, int threads) {
+  constexpr double kMaxContradictedOfRigs = 0.25;
+  const MapCameras cameras = CamerasOf(graph, model, threads);
+  const std::vector<MapPoint> points = PointsOfModel(graph, model);
+  MapStatistics statistics;
+  (void)WhyNotContradicted({graph, cameras, points, {}}, &statistics);
+  if (statistics.contradicted_share <= kMaxContradictedOfRigs) return "";
+  return fmt::format("pairs of views with {:.0f} % of all matches contradict the poses",
+                     100 * statistics.contradicted_share);
+}
+
 std::string WhyContradicted(const ViewGraph& graph, const calib::SfmModel& model, int threads) {
   const MapCameras cameras = CamerasOf(graph, model, threads);
   const std::vector<MapPoint> points = PointsOfModel(graph, model);

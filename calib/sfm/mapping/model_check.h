@@ -15,4 +15,9 @@ namespace dtr::sfm {
 /// where an image of the model is none of the graph's or has other features.
 std::string WhyContradicted(const ViewGraph& graph, const calib::SfmModel& model, int threads);
 
+/// The same of a model whose images stand as rigs of known form say: what of it hangs on few points
+/// has its position from its rig, and one image of repeated structure decides nothing. The whole of
+/// the matches does.
+std::string WhyRigsContradicted(const ViewGraph& graph, const calib::SfmModel& model, int threads);
+
 }  // namespace dtr::sfm

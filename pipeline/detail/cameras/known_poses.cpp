@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 
+#include "calib/bundle/refine.h"
 #include "calib/colmap/held_out.h"
 #include "calib/colmap/known_poses.h"
 #include "calib/colmap/model_io.h"
@@ -18,6 +19,7 @@
 #include "dtr/io/formats/transforms_json.h"
 #include "pipeline/detail/cameras/camera_formats.h"
 #include "pipeline/detail/cameras/foreign_cameras.h"
+#include "pipeline/detail/cameras/given_cameras.h"
 #include "pipeline/detail/import/camera_distortion.h"
 #include "pipeline/detail/photos/named_files.h"
 #include "pipeline/detail/photos/names_of_photos.h"
@@ -104,8 +106,10 @@ CalibratedPhotos Triangulated(const Given& given, const capture::Capture& captur
     if (found == given.by_name.end()) continue;
     colmap::PosedImage posed = found->second;
     posed.mask_file = capture::SfmMaskFile(workspace / "photos", photo);
-    (options.held_out[i] ? held_out : sources).push_back(std::move(posed));
-    if (!options.held_out[i]) source_photos.photos.push_back(photo);
+    // As in structure from motion, cameras that are to be adjusted need their observations.
+    const bool is_source = !options.held_out[i] || options.refine_poses;
+    (is_source ? sources : held_out).push_back(std::move(posed));
+    if (is_source) source_photos.photos.push_back(photo);
   }
   RequireSharedNames(sources.size(), options.poses, given.first, capture);
   capture::PrepareSfmImages(source_photos, workspace / "photos", 0, options.threads,
@@ -113,9 +117,10 @@ CalibratedPhotos Triangulated(const Given& given, const capture::Capture& captur
   CalibratedPhotos calibrated;
   calibrated.unit = given.unit;
   calibrated.world_origin = given.world_origin;
-  calibrated.model = colmap::TriangulateWithPoses(workspace / "photos", sources, workspace / "sfm",
-                                                  SfmOptionsFor(options), progress)
-                         .model;
+  GivenPhotos photos{options.poses.filename().string(), sources, workspace, SfmOptionsFor(options)};
+  TriangulatedCameras triangulated = TriangulateAndTest(photos, progress);
+  calibrated.model = std::move(triangulated.model);
+  calibrated.report.given_cameras = std::move(triangulated.conventions);
   for (const colmap::PosedImage& posed : held_out) {
     AddImage({0, posed.name, 0, posed.cam_from_world, {}}, posed.camera, calibrated.model);
   }
@@ -268,6 +273,24 @@ PosesFile FromForeign(const std::vector<io::SizedImage>& images, const CameraFor
   return file;
 }
 
+// Bundle adjustment where it pays.
+void RefineGiven(const CalibrateOptions& options, CalibratedPhotos& calibrated,
+                 Progress& progress) {
+  progress.Stage("bundle adjustment", 0);
+  calib::RefineOptions refine;
+  refine.threads = options.threads;
+  refine.seed = options.seed;
+  refine.progress = &progress;
+  calib::Refined refined = calib::Refine(calibrated.model, refine);
+  progress.Note(refined.changed
+                    ? fmt::format("given cameras are adjusted: held-out observations lie {:.3g} px "
+                                  "from where they are predicted, {:.3g} px with the given ones",
+                                  refined.adjusted_px, refined.given_px)
+                    : "given cameras stay as they are: " + refined.reason);
+  calibrated.report.bundle_adjustment = {.refined = refined, .metres = {}};
+  calibrated.model = std::move(refined.model);
+}
+
 }  // namespace
 
 PosesFile ReadPoses(const capture::Capture& capture, const fs::path& poses,
@@ -297,10 +320,11 @@ PosesFile ReadPoses(const capture::Capture& capture, const fs::path& poses,
 
 SparseScene TriangulatedPoints(const io::CameraList& list, const capture::Capture& photos,
                                const CalibrateOptions& options, const fs::path& workspace,
-                               Progress& progress) {
+                               calib::ConventionReport& conventions, Progress& progress) {
   progress.Note("points are triangulated from the photos, with their cameras fixed");
   const CalibratedPhotos calibrated =
       Triangulated(GivenIn(list), photos, options, workspace, progress);
+  if (calibrated.report.given_cameras) conventions = *calibrated.report.given_cameras;
   std::vector<std::string> names;
   std::vector<PinholeCamera> pinholes;
   for (const io::NamedCamera& named : list.cameras) {
@@ -335,6 +359,7 @@ CalibratedPhotos FromKnownPoses(const capture::Capture& capture, const Calibrate
                                     ? FromColmapModel(capture, options, workspace, progress)
                                     : FromCameraList(capture, options, workspace, progress);
   calibrated.report.points = calibrated.model.points.size();
+  if (options.refine_poses) RefineGiven(options, calibrated, progress);
   return calibrated;
 }
 

@@ -35,11 +35,13 @@ PosesFile ReadPoses(const capture::Capture& capture, const std::filesystem::path
                     const std::string& format);
 
 /// Points that photos show, triangulated with the cameras of `list` held fixed; views are indices
-/// into it. Of `options` threads, seed, memory and held_out (for each photo) are used; photos that
-/// are held out give no points.
+/// into it. `conventions`: what the test of the cameras said (given_cameras.h). Of `options`
+/// threads, seed, memory and held_out (for each photo) are used; photos that are held out give no
+/// points.
 SparseScene TriangulatedPoints(const io::CameraList& list, const capture::Capture& photos,
                                const CalibrateOptions& options,
-                               const std::filesystem::path& workspace, Progress& progress);
+                               const std::filesystem::path& workspace,
+                               calib::ConventionReport& conventions, Progress& progress);
 
 /// Cameras from options.poses: the folder of a COLMAP model, or a file as of ReadPoses.
 /// Where these bring no points, points are triangulated with the cameras held fixed, from photos

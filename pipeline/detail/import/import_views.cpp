@@ -18,6 +18,7 @@
 #include "dtr/render/geometry.h"
 #include "pipeline/depth_settings.h"
 #include "pipeline/detail/import/import_depth.h"
+#include "pipeline/detail/reports/calibration_json.h"
 #include "pipeline/detail/run/finishing.h"
 
 namespace dtr::pipeline {
@@ -183,6 +184,7 @@ nlohmann::json Inputs(const io::CameraList& list, const ImportOptions& options,
   inputs["made_by"] = "import";
   inputs["photos"] = photos;
   inputs["depth_unit"] = options.depth_unit.value_or(1.0);
+  if (options.conventions) inputs["calibration"]["given_cameras"] = JsonOf(*options.conventions);
   return inputs;
 }
 

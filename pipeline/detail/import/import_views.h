@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/validation/conventions.h"
 #include "dtr/base/progress.h"
 #include "dtr/io/formats/cameras_json.h"
 #include "dtr/io/image_io.h"
@@ -49,6 +50,8 @@ struct ImportOptions {
   /// Views in memory at a time take at most so many 1e9 bytes (one alone may be larger); 0: no
   /// bound.
   double memory_gb = 0;
+  /// What a test of the cameras said, for the set's provenance; decides nothing.
+  std::optional<calib::ConventionReport> conventions = {};
   bool completion = false;  ///< of depth that comes with the views (CompleteDepth)
 };
 

@@ -69,4 +69,33 @@ std::vector<bool> ChooseHeldOut(const std::string& spec, std::span<const std::st
   return held_out;
 }
 
+std::vector<bool> ChooseHeldOutPanoramas(const std::string& spec,
+                                         std::span<const std::string> names,
+                                         std::span<const std::string> panorama_of) {
+  if (spec.empty()) return std::vector<bool>(names.size(), false);
+  std::vector<std::string> panoramas(panorama_of.begin(), panorama_of.end());
+  std::sort(panoramas.begin(), panoramas.end());
+  panoramas.erase(std::unique(panoramas.begin(), panoramas.end()), panoramas.end());
+  std::string of_panoramas = spec;
+  if (!spec.starts_with(kEvery)) {  // a view's name stands for its panorama's
+    of_panoramas.clear();
+    std::istringstream list(spec);
+    for (std::string wanted; std::getline(list, wanted, ',');) {
+      const auto view = std::find_if(names.begin(), names.end(), [&](const std::string& name) {
+        return IsCalled(name, wanted);
+      });
+      if (!of_panoramas.empty()) of_panoramas += ',';
+      of_panoramas +=
+          view == names.end() ? wanted : panorama_of[static_cast<size_t>(view - names.begin())];
+    }
+  }
+  const std::vector<bool> chosen = ChooseHeldOut(of_panoramas, panoramas);
+  std::vector<bool> held_out;
+  for (const std::string& panorama : panorama_of) {
+    const auto at = std::lower_bound(panoramas.begin(), panoramas.end(), panorama);
+    held_out.push_back(chosen[static_cast<size_t>(at - panoramas.begin())]);
+  }
+  return held_out;
+}
+
 }  // namespace dtr::pipeline

@@ -35,6 +35,7 @@ Json OptionsJson(const BuildOptions& options, const stereo::QualitySettings& qua
   json["holdout_strict"] = options.holdout_strict;
   json["poses"] = options.poses.filename().string();
   json["refine"] = options.refine;
+  if (options.refine_poses) json["refine_poses"] = true;
   if (options.keep_duplicates) json["keep_duplicates"] = true;
   if (!options.rig.empty()) json["rig"] = options.rig.filename().string();
   if (options.metres.any()) json["metres"] = JsonOf(options.metres);

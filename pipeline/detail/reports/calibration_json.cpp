@@ -114,6 +114,21 @@ Json JsonOf(const CameraSharing& sharing) {
   return json;
 }
 
+Json JsonOf(const calib::ConventionReport& report) {
+  Json json{{"pairs", report.pairs},
+            {"matches", report.matches},
+            {"residual_px", report.tested() ? Json(report.given_px) : Json()},
+            {"limit_px", report.limit_px},
+            {"fits", report.fits()},
+            {"found", Json::array()}};
+  for (const calib::Convention& convention : report.found) {
+    json["found"].push_back({{"name", convention.name},
+                             {"advice", convention.advice},
+                             {"residual_px", convention.residual_px}});
+  }
+  return json;
+}
+
 Json RefinementJson(const CalibrationReport& report) {
   Json json = Json::object();
   if (report.rig) json["rig"] = JsonOf(*report.rig);
@@ -149,6 +164,7 @@ Json JsonOf(const CalibrationReport& report) {
   if (report.sfm) json["lens_model"] = report.sfm->lens_model;
   json.update(RefinementJson(report));
   if (report.exif_focal) json["exif_focal"] = JsonOf(*report.exif_focal);
+  if (report.given_cameras) json["given_cameras"] = JsonOf(*report.given_cameras);
   return json;
 }
 

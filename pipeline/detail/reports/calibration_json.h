@@ -9,8 +9,12 @@
 namespace dtr::pipeline {
 
 /// As a set's provenance has it under `calibration`: the fields of `sfm` and `points`, then `rig`,
-/// `camera_sharing`, `bundle_adjustment` and `exif_focal` where there are such.
+/// `camera_sharing`, `bundle_adjustment`, `exif_focal` and `given_cameras` where there are such.
 nlohmann::ordered_json JsonOf(const CalibrationReport& report);
+
+/// {pairs, matches, residual_px, limit_px, fits, found[].{name,advice,residual_px}}; residual_px
+/// null where there were too few matches.
+nlohmann::ordered_json JsonOf(const calib::ConventionReport& report);
 
 /// {camera_per, tests[]}; no tests where no group of photos lies in several folders.
 nlohmann::ordered_json JsonOf(const CameraSharing& sharing);

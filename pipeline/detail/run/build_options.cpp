@@ -39,6 +39,11 @@ void RequireOptions(const BuildOptions& options) {
         "`gps`: expected photos, which say where they were taken, found a video; give `distance` "
         "or use dtr calibrate scale");
   }
+  if (options.refine_poses && options.poses.empty()) {
+    throw UsageError(
+        "`refine`: adjusts the cameras of `poses`; expected `poses` (cameras that SfM finds are "
+        "adjusted without it)");
+  }
   if (options.rig.empty()) return;
   if (!options.poses.empty()) {
     throw UsageError("`rig`: sets the poses of what SfM finds; expected no `poses` beside it");
@@ -57,6 +62,25 @@ void RequireOptions(const BuildOptions& options) {
         "which says which are; give photos, one folder per camera, of equal names",
         options.rig.string(), (options.photos / "timestamps.csv").string()));
   }
+}
+
+void RequirePanoramaOptions(const BuildOptions& options) {
+  const auto reject = [](bool given, const char* what) {
+    if (given) {
+      throw UsageError(std::string("the photos are panoramas, whose views are a rig with known "
+                                   "intrinsics: ") +
+                       what);
+    }
+  };
+  reject(!options.rig.empty(), "leave out `rig`");
+  reject(!options.refine, "leave out `no_refine`");
+  reject(options.sfm.camera_per != CameraPer::kAuto, "leave out `camera_per`");
+  reject(options.metres.any(),
+         "`gps` and `distance` do not go with them; dtr calibrate scale takes the finished set");
+  reject(options.holdout_strict,
+         "`holdout_strict` does not go with them; `holdout` holds out whole panoramas");
+  reject(options.sfm.engine == colmap::SfmEngine::kColmap,
+         "COLMAP 3.8 cannot hold one; use `sfm` auto or global");
 }
 
 }  // namespace dtr::pipeline

@@ -9,5 +9,7 @@ BuildOptions ByPreset(BuildOptions options);
 
 /// Throws UsageError where options ask for what cannot be had together.
 void RequireOptions(const BuildOptions& options);
+/// The same of photos that are views of panoramas.
+void RequirePanoramaOptions(const BuildOptions& options);
 
 }  // namespace dtr::pipeline

@@ -1,0 +1,157 @@
+// Cameras that came from elsewhere: a build tests them, names usual mistakes, and adjusts them
+// where it is asked to.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "datasets/make.h"
+#include "dtr/base/error.h"
+#include "dtr/base/random.h"
+#include "dtr/io/formats/cameras_json.h"
+#include "dtr/io/set_io.h"
+#include "pipeline/build.h"
+#include "tests/support/message_of.h"
+#include "tests/support/noted_lines.h"
+#include "tests/support/test_data.h"
+
+namespace dtr::pipeline {
+namespace {
+
+using dtr::testing::MessageOf;
+using dtr::testing::NotedLines;
+using dtr::testing::TemporaryFolder;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class GivenCameras : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder;
+    datasets::DatasetSpec spec;
+    spec.scene = "courtyard";
+    spec.views = 8;
+    spec.width_px = 480;
+    spec.height_px = 320;
+    spec.supersampling = 2;
+    SilentProgress silent;
+    datasets::MakeDataset(spec, *folder_ / "room", 2, silent);
+  }
+  static void TearDownTestSuite() {
+    delete folder_;
+    folder_ = nullptr;
+  }
+  struct Built {
+    std::vector<std::string> lines;
+    std::string error;
+    DtrSet set;
+  };
+  // Builds with the true cameras after `change`.
+  static Built Build(const std::string& name, const std::function<void(io::NamedCamera&)>& change,
+                     bool refine = false) {
+    io::CameraList list = io::ReadCamerasJson(*folder_ / "room/cameras.json");
+    for (io::NamedCamera& camera : list.cameras) change(camera);
+    io::WriteCamerasJson(*folder_ / (name + ".json"), list);
+    BuildOptions options;
+    options.photos = *folder_ / "room/images";
+    options.poses = *folder_ / (name + ".json");
+    options.output = *folder_ / (name + ".dtr");
+    options.depth.engine = "none";
+    options.sfm.engine = colmap::SfmEngine::kGlobal;
+    options.refine_poses = refine;
+    NotedLines lines;
+    Built built;
+    try {
+      (void)BuildSet(options, lines);
+      built.set = io::ReadSet(options.output);
+    } catch (const Error& error) {
+      built.error = error.what();
+    }
+    built.lines = std::move(lines.lines);
+    return built;
+  }
+  // The tests that the set's validation result lists.
+  static nlohmann::json TestCalled(const DtrSet& set, const std::string& name) {
+    const auto result = nlohmann::json::parse(set.validation_json);
+    for (const auto& test : result["tests"]) {
+      if (test["name"] == name) return test;
+    }
+    ADD_FAILURE() << "no test " << name << " in " << set.validation_json.substr(0, 300);
+    return {};
+  }
+  static TemporaryFolder* folder_;
+};
+TemporaryFolder* GivenCameras::folder_ = nullptr;
+
+TEST_F(GivenCameras, RightOnesPassAndNothingIsReported) {
+  const Built built = Build("right", [](io::NamedCamera&) {});
+  ASSERT_EQ(built.error, "");
+  EXPECT_THAT(built.lines, Not(Contains(HasSubstr("matched features lie"))));
+  const auto test = TestCalled(built.set, "given_cameras_px");
+  EXPECT_TRUE(test["passed"]) << test;
+  EXPECT_LT(test["value"], 0.5);
+}
+
+TEST_F(GivenCameras, OpenGlAxesAreNamedWithWhatToDo) {
+  Built built = Build("gl", [](io::NamedCamera& camera) {
+    const Eigen::Matrix3d gl = Eigen::Vector3d(1, -1, -1).asDiagonal();
+    camera.cam_from_world =
+        Pose{Eigen::Quaterniond(gl), Eigen::Vector3d::Zero()} * camera.cam_from_world;
+  });
+  if (built.error.empty()) {
+    EXPECT_FALSE(TestCalled(built.set, "given_cameras_px")["passed"]);
+  }
+  built.lines.push_back(built.error);
+  EXPECT_THAT(built.lines, Contains(::testing::AllOf(
+                               HasSubstr("gl.json: matched features lie"),
+                               HasSubstr("OpenGL's axes (y up, z back)"),
+                               HasSubstr("negate the second and third row of cam_from_world"))));
+}
+
+TEST_F(GivenCameras, TheCamerasOfAFileMayBeAdjusted) {
+  Random random(3);
+  const Built built = Build(
+      "off",
+      [&](io::NamedCamera& camera) {
+        const Eigen::Vector3d axis(random.Normal(), random.Normal(), random.Normal());
+        const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.003, axis.normalized()));
+        camera.cam_from_world = Pose{turn, Eigen::Vector3d::Zero()} * camera.cam_from_world;
+      },
+      true);
+  ASSERT_EQ(built.error, "");
+  EXPECT_THAT(built.lines,
+              Contains(HasSubstr("given cameras are adjusted: held-out observations lie")));
+  const auto truth = io::ReadCamerasJson(*folder_ / "room/cameras.json");
+  const auto given = io::ReadCamerasJson(*folder_ / "off.json");
+  const auto& views = built.set.frames.front().views;
+  ASSERT_EQ(views.size(), truth.cameras.size());
+  // Rotations from one photo to the next, which no choice of the world changes.
+  const auto error = [&](const std::function<Pose(size_t)>& pose) {
+    double sum = 0;
+    for (size_t i = 0; i + 1 < views.size(); ++i) {
+      const Pose found = pose(i + 1) * pose(i).Inverse();
+      const Pose expected =
+          truth.cameras[i + 1].cam_from_world * truth.cameras[i].cam_from_world.Inverse();
+      sum += found.rotation.angularDistance(expected.rotation);
+    }
+    return sum;
+  };
+  EXPECT_LT(error([&](size_t i) { return views[i].cam_from_world; }),
+            0.5 * error([&](size_t i) { return given.cameras[i].cam_from_world; }));
+}
+
+TEST_F(GivenCameras, AdjustingNeedsCamerasOfAFile) {
+  BuildOptions options;
+  options.photos = *folder_ / "room/images";
+  options.output = *folder_ / "no.dtr";
+  options.refine_poses = true;
+  SilentProgress silent;
+  EXPECT_THAT(MessageOf<UsageError>([&] { (void)BuildSet(options, silent); }),
+              HasSubstr("`refine`: adjusts the cameras of `poses`"));
+}
+
+}  // namespace
+}  // namespace dtr::pipeline
