@@ -20,7 +20,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace dtr::stereo::patchmatch::HWY_NAMESPACE {
 
-/// Candidates per visit: the pixel's own plane, 4 near and 4 far regions, 3 guesses.
+/// Candidates per visit: the pixel's own plane, 4 near and 4 far regions, 3 suggested.
 constexpr int kPlanes = 12;
 /// A view sees a pixel when more than this many candidates match well in it and fewer than that
 /// badly. ACMH's 2 and 3 take the observation from all views next to silhouettes and behind thin
