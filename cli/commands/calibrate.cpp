@@ -42,7 +42,7 @@ int RunCalibratePhotos(const CalibrateArguments& options, const Context& context
   pipeline::CalibrateOptions calibrate;
   // Before any photo is read: what is missing or wrong must not cost their time.
   if (!options.lens.empty()) calibrate.lens = pipeline::ReadLens(options.lens);
-  pipeline::RequireCalibration({}, options.sfm);
+  pipeline::RequireCalibration({}, "", options.sfm);
   auto photos = capture::IngestPhotos(
       options.photos, {.threads = context.common.threads, .memory_gb = options.memory_gb},
       context.console);
