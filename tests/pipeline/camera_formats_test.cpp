@@ -167,7 +167,9 @@ TEST(CameraFormats, OneCaptureGivesTheSameCamerasWhicheverProgramWroteIt) {
   ASSERT_EQ(programs.size(), 8u);
   for (const SourceProgram& program : programs) {
     SCOPED_TRACE(program.format);
-    const CamerasFromFile read = ReadCameraFile(program.file, "", {.images = photos});
+    CameraFileFolders folders;
+    folders.images = photos;
+    const CamerasFromFile read = ReadCameraFile(program.file, "", folders);
     ASSERT_EQ(read.list.cameras.size(), capture.cameras.size());
     std::map<std::string, io::NamedCamera> by_name;
     for (const io::NamedCamera& named : read.list.cameras) by_name[named.name] = named;
