@@ -1,7 +1,10 @@
 #include "pipeline/validate.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <atomic>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "calib/validation/report_json.h"
@@ -65,6 +68,61 @@ void AddCrossDepth(const std::filesystem::path& folder, const DtrSet& set, const
   report.cross_depth = std::move(cross);
 }
 
+// Fewer points in common leave the scale of what hangs on them open.
+constexpr int kMinJoiningPoints = 50;
+
+// Images that free cameras would join: from the two that share the most points on, always the one
+// that sees the most points of two images before it, as long as these are enough.
+std::vector<bool> JoinedByPoints(const calib::Bundle& bundle) {
+  const size_t images = bundle.images.size();
+  std::vector<std::vector<int>> points_of(images), images_of(bundle.points.size());
+  for (const calib::BundleObservation& o : bundle.observations) {
+    points_of[static_cast<size_t>(o.image)].push_back(o.point);
+    images_of[static_cast<size_t>(o.point)].push_back(o.image);
+  }
+  std::map<std::pair<int, int>, int> shared;
+  for (const std::vector<int>& seen_by : images_of) {
+    for (size_t i = 0; i < seen_by.size(); ++i) {
+      for (size_t j = i + 1; j < seen_by.size(); ++j) ++shared[{seen_by[i], seen_by[j]}];
+    }
+  }
+  std::vector<bool> joined(images, false);
+  if (shared.empty()) return joined;
+  const auto most =
+      std::max_element(shared.begin(), shared.end(),
+                       [](const auto& a, const auto& b) { return a.second < b.second; });
+  std::vector<int> seen(bundle.points.size(), 0), known(images, 0);
+  const auto add = [&](size_t image) {
+    joined[image] = true;
+    for (const int point : points_of[image]) {
+      if (++seen[static_cast<size_t>(point)] != 2) continue;
+      for (const int other : images_of[static_cast<size_t>(point)]) {
+        ++known[static_cast<size_t>(other)];
+      }
+    }
+  };
+  add(static_cast<size_t>(most->first.first));
+  add(static_cast<size_t>(most->first.second));
+  while (true) {
+    size_t best = images;
+    for (size_t i = 0; i < images; ++i) {
+      if (!joined[i] && (best == images || known[i] > known[best])) best = i;
+    }
+    if (best == images || known[best] < kMinJoiningPoints) return joined;
+    add(best);
+  }
+}
+
+// Of views of panoramas those stay that points join: a floor that the views downwards alone show
+// has its place from the rig, which a fresh adjustment does not know. Returns how many went.
+int LeaveOutViewsOfTheRigAlone(calib::Bundle& bundle) {
+  const std::vector<bool> joined = JoinedByPoints(bundle);
+  std::erase_if(bundle.observations, [&](const calib::BundleObservation& o) {
+    return !joined[static_cast<size_t>(o.image)];
+  });
+  return static_cast<int>(std::count(joined.begin(), joined.end(), false));
+}
+
 }  // namespace
 
 calib::ValidationReport ReprojectionOfSet(const DtrSet& set, const SparseScene& sparse,
@@ -83,11 +141,23 @@ SetValidation ValidateSet(const std::filesystem::path& folder, const DtrSet& set
   AddCrossDepth(folder, set, limits, threads, report, progress);
   progress.Stage("cameras against their observations", 0);
   const Cameras of = CamerasOf(set);
-  calib::PhotosValidation validation = calib::ValidatePhotos(
-      calib::BundleOf(of.cameras, of.poses, of.names, sparse), limits.photos, threads, &progress);
-  report.tests.insert(report.tests.end(), validation.tests.begin(), validation.tests.end());
   const auto rig = RigOfSet(set);
-  const auto places = rig ? RigPlaces(set, sparse, *rig) : std::nullopt;
+  calib::Bundle bundle = calib::BundleOf(of.cameras, of.poses, of.names, sparse);
+  const bool panoramas = rig && calib::HasOneCentre(rig->known);
+  const int by_rig = panoramas ? LeaveOutViewsOfTheRigAlone(bundle) : 0;
+  calib::PhotosValidation validation =
+      calib::ValidatePhotos(bundle, limits.photos, threads, &progress);
+  if (panoramas) {  // it is that of free views: those of a panorama are known far better
+    std::erase_if(validation.tests,
+                  [](const Check& test) { return test.name == "image_shift_px"; });
+  }
+  report.tests.insert(report.tests.end(), validation.tests.begin(), validation.tests.end());
+  auto places = rig ? RigPlaces(set, sparse, *rig) : std::nullopt;
+  if (places && by_rig > 0) {
+    places->reason += fmt::format(
+        "; {} views share too few points with the others to be solved for without their panorama",
+        by_rig);
+  }
   if (places) report.tests.push_back(*places);
   if (const auto given = GivenCamerasCheck(set)) report.tests.push_back(*given);
   for (const calib::PhotoValidation& validated_photo : validation.cameras) {

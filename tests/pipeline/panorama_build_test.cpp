@@ -28,9 +28,8 @@ using ::testing::Contains;
 using ::testing::HasSubstr;
 
 constexpr int kPanoramas = 6;
-constexpr double kStep = 0.7;  // metres between neighbours
-// Features of views of 204 px are known to 0.2 px, 0.002 rad each; some 100 of them make a pose.
-constexpr double kMaxCentreError = 0.02 * kStep, kMaxTurnRad = 0.005;
+// Measured with 36 views of 204 px: 0.0004 m and 0.00025 rad; four times that.
+constexpr double kMaxCentreError = 0.0016, kMaxTurnRad = 0.001;
 
 class PanoramaBuild : public ::testing::Test {
  protected:
