@@ -27,7 +27,7 @@ struct DepthPriorReport {
   std::vector<std::string> lines;  ///< what was logged
 };
 
-/// JSON object: photos, maps, points, scale, scale_sigma, noise, divided_by, by_distance[],
+/// JSON object: photos, maps, points, scale, scale_sigma, noise, outliers, divided_by, by_distance[],
 /// views[].
 std::string ToJson(const DepthPriorReport& report);
 

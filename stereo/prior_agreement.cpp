@@ -15,6 +15,8 @@ constexpr double kSigmaPerMedian = 1.4826;
 constexpr double kMedianSigma = 1.2533;
 
 constexpr double kViewRatio = 0.03, kViewNoise = 0.03, kViewSigmas = 4;
+/// An outlier is off by so much, relative, at least.
+constexpr double kOutlier = 0.1;
 
 /// The shifts that are tried: 17 x 17, a pixel of a map of 250 apart.
 constexpr int kShifts = 8;
@@ -142,39 +144,48 @@ ViewPrior Measured(int view, const std::vector<Sample>& samples) {
   const double median = MedianOf(logs);
   result.ratio = std::exp(median);
   result.noise = SigmaAbout(logs, median);
+  const double limit = std::max(kOutlier, kViewSigmas * result.noise);
+  const auto outliers = std::count_if(logs.begin(), logs.end(), [&](double log_ratio) {
+    return std::abs(log_ratio - median) > limit;
+  });
+  result.outliers = static_cast<double>(outliers) / static_cast<double>(logs.size());
   return result;
 }
 
 /// Compares the views with one another, and sets what is said of all.
 void Compare(PriorAgreement& all) {
-  std::vector<double> medians, noises;
+  std::vector<double> medians, noises, outliers;
   for (const ViewPrior& view : all.views) {
     if (view.fit == ViewPrior::Fit::kFewPoints) continue;
     medians.push_back(std::log(view.ratio));
     noises.push_back(view.noise);
+    outliers.push_back(view.outliers);
   }
   if (medians.empty()) return;
   const double median = MedianOf(medians), noise = MedianOf(noises);
+  const double usual_outliers = MedianOf(outliers);
   for (ViewPrior& view : all.views) {
     if (view.fit == ViewPrior::Fit::kFewPoints) continue;
     const double off = std::abs(std::log(view.ratio) - median);
     if (off > std::max(kViewRatio, kViewSigmas * noise) ||
-        view.noise > std::max(kViewNoise, kViewSigmas * noise)) {
+        view.noise > std::max(kViewNoise, kViewSigmas * noise) ||
+        view.outliers > std::max(kMaxPriorOutliers, 2 * usual_outliers)) {
       view.fit = ViewPrior::Fit::kDiffers;
     }
   }
-  std::vector<double> fitting;
-  std::vector<double> fitting_noise;
+  std::vector<double> fitting, fitting_noise, fitting_outliers;
   for (const ViewPrior& view : all.views) {
     if (view.fit != ViewPrior::Fit::kFits) continue;
     fitting.push_back(std::log(view.ratio));
     fitting_noise.push_back(view.noise);
+    fitting_outliers.push_back(view.outliers);
     all.points += view.points;
   }
   if (fitting.empty()) return;
   const double log_scale = MedianOf(fitting);
   all.scale = std::exp(log_scale);
   all.noise = MedianOf(fitting_noise);
+  all.outliers = MedianOf(fitting_outliers);
   all.scale_sigma = kMedianSigma * std::hypot(all.noise / std::sqrt(all.points),
                                               SigmaAbout(fitting, log_scale) /
                                                   std::sqrt(static_cast<double>(fitting.size())));

@@ -204,13 +204,14 @@ void DepthPriors::Judge(LengthUnit unit, Progress& progress) {
                     where, found.shift.x() * camera.width_px(), found.shift.y() * camera.width_px(),
                     camera.width_px()));
   }
-  if (found.noise > stereo::kMaxPriorNoise) {
+  if (found.noise > stereo::kMaxPriorNoise || found.outliers > stereo::kMaxPriorOutliers) {
     throw Error(
-        fmt::format("{}: its maps do not show what the photos show, their depths scatter by {:.0f} "
-                    "% at {} points; "
-                    "give the maps of these photos, not rotated, of the photos' camera, and as "
-                    "`prior_kind` says",
-                    where, Percent(found.noise), found.points));
+        fmt::format("{}: its maps do not show what the photos show: at {} points their depths "
+                    "scatter by {:.1f} %, "
+                    "and {:.0f} % of them are off by more than 10 %; give the maps of these "
+                    "photos, neither rotated "
+                    "nor mirrored, and as `prior_kind` says",
+                    where, found.points, Percent(found.noise), Percent(found.outliers)));
   }
   const auto& bins = found.by_distance;
   const int maps = static_cast<int>(found.views.size());
@@ -237,10 +238,11 @@ void DepthPriors::LeaveOutWhatDiffers(Progress& progress) {
   if (differ > 0) {
     Say(fmt::format(
             "depth prior: the maps of {} photos left out, first that of {}: {:.3f} times the "
-            "photo's depth with a noise of {:.0f} %, the others {:.3f} with {:.1f} %; is it of "
-            "another photo?",
+            "photo's depth with a noise of {:.1f} % and {:.0f} % outliers, the others {:.3f} "
+            "with {:.1f} % and {:.0f} %; is it of another photo?",
             differ, cameras_[static_cast<size_t>(first->view)].name, first->ratio,
-            Percent(first->noise), found.scale, Percent(found.noise)),
+            Percent(first->noise), Percent(first->outliers), found.scale, Percent(found.noise),
+            Percent(found.outliers)),
         progress);
   }
   if (const int few = found.Count(ViewPrior::Fit::kFewPoints); few > 0) {

@@ -33,15 +33,11 @@ Json PriorJson(const DepthPriorChoice& choice) {
 
 Json JsonOf(const DepthPriorReport& report) {
   const stereo::PriorAgreement& found = report.agreement;
-  Json json{{"photos", report.photos},
-            {"maps", found.views.size()},
-            {"points", found.points},
-            {"scale", found.scale},
-            {"scale_sigma", found.scale_sigma},
-            {"noise", found.noise},
-            {"divided_by", report.divided_by},
-            {"by_distance", Json::array()},
-            {"views", Json::array()}};
+  Json json{{"photos", report.photos},          {"maps", found.views.size()},
+            {"points", found.points},           {"scale", found.scale},
+            {"scale_sigma", found.scale_sigma}, {"noise", found.noise},
+            {"outliers", found.outliers},       {"divided_by", report.divided_by},
+            {"by_distance", Json::array()},     {"views", Json::array()}};
   for (const stereo::PriorBin& bin : found.by_distance) {
     json["by_distance"].push_back({{"near_z", bin.near_z},
                                    {"far_z", bin.far_z},
@@ -55,6 +51,7 @@ Json JsonOf(const DepthPriorReport& report) {
                              {"points", view.points},
                              {"ratio", view.ratio},
                              {"noise", view.noise},
+                             {"outliers", view.outliers},
                              {"fit", NameOf(view.fit)}});
   }
   return json;
