@@ -189,7 +189,7 @@ Reader OpenPincam(const fs::path& folder) {
 Reader OpenScanNet(const fs::path& folder) {
   const std::string matrix = "50 0 32 0\n0 50 24 0\n0 0 1 0\n0 0 0 1\n";
   return OpenCapture(folder, "scannet", "color/0.png", "pose/0.txt",
-                     {"1 0 0 0.5\n0 1 0 1\n0 0 1 2\n0 0 0 1\n", "-inf -inf -inf -inf\n"},
+                     {"1 0 0 0.5\n0 1 0 1\n0 0 1 2\n0 0 0 1\n"},
                      {{"intrinsic/intrinsic_color.txt", matrix}});
 }
 Reader OpenTum(const fs::path& folder) {

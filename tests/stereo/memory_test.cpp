@@ -207,6 +207,23 @@ TEST_F(MemoryLimit, IsKeptAtTheLeastThatWorksWithTheSameBytes) {
   }
 }
 
+// Priors on the finest grid there is, that of the views.
+TEST_F(MemoryLimit, CountsPriors) {
+  const DepthPrior prior{[] {
+                           DepthImage map(kCamera.width_px(), kCamera.height_px());
+                           std::fill(map.grid().data().begin(), map.grid().data().end(), 4.0f);
+                           return map;
+                         },
+                         {{4}, {0.05}}};
+  for (StereoView& view : views_) view.prior = &prior;
+  const auto engine = MakeEngine(
+      "patchmatch", {.neighbours = 3, .round_neighbours = 4, .iterations = 1, .rounds = 1});
+  const std::uint64_t least = Least(*engine);
+  const Computed tight = Compute(*engine, least, 1);
+  EXPECT_LE(tight.peak_bytes, static_cast<long>(least));
+  EXPECT_GE(tight.peak_bytes, static_cast<long>(0.7 * static_cast<double>(least)));
+}
+
 TEST_F(MemoryLimit, TooLittleIsSaidBeforeAnyWork) {
   const auto engine = MakeEngine("patchmatch");
   const std::uint64_t least = Least(*engine);
