@@ -74,7 +74,7 @@ TEST_F(Advice, OfImportsOfPhotosLeadsToTheGoal) {
   const std::string photos = CopyOfPhotos("photos"), empty = Folder("empty"),
                     nothing = Folder("nothing");
   fs::remove(In("photos/0003.jpg"));
-  fs::copy(cameras, In("poses.list"));
+  Write("poses.list", "0000.jpg 1 2 3\n");
   ExpectAllLeadToTheGoal({
       {kFailed,
        "give --allow-missing to leave such cameras out",
@@ -88,11 +88,10 @@ TEST_F(Advice, OfImportsOfPhotosLeadsToTheGoal) {
        Import(sparse, empty),
        {},
        Import(sparse, Photos())},
-      {kWrongUsage,
-       "found another name; give --format",
+      {kWrongUsage, "not recognised; what can be read (its --format)",
        Import(In("poses.list"), Photos(), {"--depth", Depth()}),
-       {},
-       Import(In("poses.list"), Photos(), {"--depth", Depth(), "--format", "cameras-json"})},
+       [&] { fs::copy(cameras, In("poses.list"), fs::copy_options::overwrite_existing); },
+       Import(In("poses.list"), Photos(), {"--depth", Depth()})},
       {kWrongUsage, "expected a mask of 0000.jpg or of another photo, called 0000.png",
        Import(sparse, Photos(), {"--masks", empty}),
        [&] {
@@ -204,11 +203,10 @@ TEST_F(Advice, OfLensFilesLeadsToTheGoal) {
   const std::string size = "image_width: 192\nimage_height: 128\n";
   const std::string sizeless = Write("sizeless.yml", matrices);
   const std::string twice = Write("twice.yml", size + matrices + "mtx: [1]\n");
-  const std::string chain = Write("chain.yaml", "cam0:\n  intrinsics: [150, 150, 95.5, 63.5]\n");
-  const std::string good = size +
-                           "camera_matrix: !!opencv-matrix\n   data: [ 150, 0, 95.5, 0, 150, 63.5, "
-                           "0, 0, 1 ]\ndistortion_coefficients: !!opencv-matrix\n   data: [ 0, 0, "
-                           "0, 0 ]\n";
+  const std::string of_chain =
+      "cam0:\n  camera_model: pinhole\n  intrinsics: [150, 150, 95.5, 63.5]\n"
+      "  distortion_model: radtan\n  distortion_coeffs: [0, 0, 0, 0]\n";
+  const std::string chain = Write("chain.yaml", of_chain);
   const std::string two =
       Write("two.txt", "1 PINHOLE 192 128 150 150 96 64\n2 PINHOLE 192 128 150 150 96 64\n");
   ExpectAllLeadToTheGoal({
@@ -216,8 +214,8 @@ TEST_F(Advice, OfLensFilesLeadsToTheGoal) {
        [&] { Write("sizeless.yml", size + matrices); }, refine(sizeless)},
       {kFailed, "may both be the camera matrix; leave the one that is meant", refine(twice),
        [&] { Write("twice.yml", size + matrices); }, refine(twice)},
-      {kFailed, "which is another format; write image_width, image_height", refine(chain),
-       [&] { Write("chain.yaml", good); }, refine(chain)},
+      {kFailed, "cam0: expected a field resolution", refine(chain),
+       [&] { Write("chain.yaml", of_chain + "  resolution: [192, 128]\n"); }, refine(chain)},
       {kFailed, "give a file with the camera that took the photos", refine(two),
        [&] { Write("two.txt", "1 PINHOLE 192 128 150 150 96 64\n"); }, refine(two)},
       {kWrongUsage,

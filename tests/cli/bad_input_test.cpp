@@ -292,8 +292,8 @@ TEST_F(BadInput, PicturesThatCannotBeAskedForOrWritten) {
                  "expected at least one side above 0");
   ExpectRejected(Render({"--like", "0001", "-o", In("view.png"), "--depth-out", In("d.png")}),
                  kWrongUsage, "expected a name ending in .exr, found '.png'");
-  ExpectRejected(Render({"--camera", In("absent.json"), "-o", In("view.png")}), kFailed,
-                 "cannot be read: No such file or directory");
+  ExpectRejected(Render({"--camera", In("absent.json"), "-o", In("view.png")}), kWrongUsage,
+                 "no such file or folder");
   EXPECT_THAT(Contents(folder_.path()), IsEmpty());
 }
 

@@ -15,7 +15,8 @@ TEST_F(Rejections, WhatIsNoDataSet) {
     return further;
   };
   ExpectAllRejected({
-      {kWrongUsage, "scene: expected courtyard, plane, stairs, sphere, room or plain-room, found 'park'",
+      {kWrongUsage,
+       "scene: expected courtyard, plane, stairs, sphere, room or plain-room, found 'park'",
        make("park", {})},
       {kWrongUsage, "for scene 'plane', found 'circle'", make("plane", {"--layout", "circle"})},
       {kWrongUsage, "views: expected 2 to", make("plane", {"--views", "1"})},
@@ -341,7 +342,7 @@ TEST_F(Rejections, FilesAndFoldersOfAnotherKind) {
   const std::string file = Write("file", "");
   ExpectAllRejected({
       {kFailed,
-       "cannot be read: Is a directory",
+       "give the file in it that has the cameras",
        {"render", Shared("good.dtr"), "--renderer", "cpu", "--camera", Folder("folder"), "-o",
         In("view.png")}},
       {kFailed,
@@ -355,8 +356,8 @@ TEST_F(Rejections, AFileThatEndsBeforeItsSize) {
   // The kernel says 4096 bytes of it, and gives some dozens.
   const fs::path shorter = "/sys/kernel/mm/transparent_hugepage/enabled";
   if (!fs::exists(shorter)) GTEST_SKIP() << "no " << shorter;
-  ExpectRejected(Dtr({"render", Shared("good.dtr"), "--renderer", "cpu", "--camera",
-                      shorter.string(), "-o", In("view.png")}),
+  ExpectRejected(Dtr({"import", "--cameras", shorter.string(), "--format", "cameras-json",
+                      "--images", Folder("photos"), "-o", In("cut.dtr")}),
                  kFailed,
                  "that can be read; read it again once nothing writes it, or copy it again");
 }
