@@ -13,6 +13,7 @@
 #include "capture/contents_json.h"
 #include "capture/sfm_images.h"
 #include "dtr/base/error.h"
+#include "dtr/types/panorama.h"
 #include "pipeline/detail/cameras/camera_formats.h"
 #include "pipeline/detail/cameras/known_poses.h"
 #include "pipeline/detail/cameras/panorama_poses.h"
@@ -130,6 +131,9 @@ std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
     inputs.push_back({photo.name, photo.width_px, photo.height_px, photo.focal_prior_px,
                       groups.GroupOf(photo), capture::SfmMaskFile(folder, photo),
                       photo.face ? photo.face->panorama : std::string()});
+    if (photo.face) {
+      inputs.back().cam_from_station = FaceCalled(photo.face->face).cam_from_panorama;
+    }
   }
   return inputs;
 }

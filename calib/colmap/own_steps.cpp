@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <map>
 
 #include "calib/colmap/database.h"
 #include "calib/colmap/graph_database.h"
@@ -195,12 +196,30 @@ void OwnMatches(Workspace& workspace, const fs::path& features,
   RemoveAll(match.journal);
 }
 
+namespace {
+
+// Gives the graph's images, by their own names, the stations of the workspace's.
+void SetStations(const Workspace& workspace, sfm::ViewGraph* graph) {
+  std::map<std::string, int> numbers;
+  std::map<std::string, const SfmImageInput*> input_of;
+  for (const SfmImageInput& input : workspace.images()) input_of[input.name] = &input;
+  for (sfm::GraphImage& image : graph->images) {
+    const SfmImageInput& input = *input_of.at(image.name);
+    if (input.station.empty()) continue;
+    image.station = numbers.emplace(input.station, static_cast<int>(numbers.size())).first->second;
+    image.cam_from_station = input.cam_from_station;
+  }
+}
+
+}  // namespace
+
 GloballyMapped MapHere(Workspace& workspace, const SfmOptions& options,
                        const std::optional<GroupLenses>& fixed, bool focals_hold) {
   sfm::ViewGraph graph = ReadViewGraph(workspace.database());
   // Under the photos' own names, which messages name.
   for (sfm::GraphImage& image : graph.images) image.name = workspace.NameOfAlias(image.name);
   if (fixed) graph.cameras = fixed->lenses;
+  SetStations(workspace, &graph);
   GloballyMapped result;
   workspace.RunHere([&] {
     sfm::Mapped mapped = sfm::MapGlobally(graph, {.threads = workspace.threads(),

@@ -24,6 +24,7 @@ struct SfmImageInput {
   /// Photos of one station (views of a panorama) were taken from one point: without parallax they
   /// tell nothing of each other, and are not matched. Empty: of none.
   std::string station = {};
+  Eigen::Matrix3d cam_from_station = Eigen::Matrix3d::Identity();  ///< of images with a station
 };
 
 /// Which pairs of photos are matched in full.

@@ -56,6 +56,10 @@ struct GraphImage {
   std::string name;
   int camera = 0;                       ///< index into ViewGraph::cameras
   std::vector<Eigen::Vector2d> pixels;  ///< of its features
+  /// Images of one station (views of a panorama) stand in one point, in known rotations to it; -1:
+  /// of none.
+  int station = -1;
+  Eigen::Matrix3d cam_from_station = Eigen::Matrix3d::Identity();
 };
 
 /// Photos and the pairs among them that were matched; pairs sorted by (image_a, image_b).

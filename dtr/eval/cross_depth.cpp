@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <set>
+#include <tuple>
 
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
@@ -71,12 +72,25 @@ double AngleAt(const Eigen::Vector3d& center, const View& a, const View& b) {
 }
 
 /// Indices of the nearest views, nearest first; ties by index.
+// Views from one point, as those of a panorama, say nothing of each other's depth; views that look
+// elsewhere have nothing in common, however near they stand.
+bool MayCompare(const View& a, const View& b) {
+  constexpr double kMinCosine = 0.5, kSamePoint = 1e-9;
+  const Eigen::Vector3d centre_a = a.CenterInWorld(), centre_b = b.CenterInWorld();
+  const double size = std::max(centre_a.norm(), centre_b.norm());
+  if ((centre_a - centre_b).norm() <= kSamePoint * size) return false;
+  const Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();
+  return (a.cam_from_world.rotation.conjugate() * axis)
+             .dot(b.cam_from_world.rotation.conjugate() * axis) >= kMinCosine;
+}
+
 std::vector<size_t> Neighbours(std::span<const View* const> views, size_t reference,
                                const CrossDepthOptions& options) {
-  std::vector<std::pair<double, size_t>> order;
+  std::vector<std::tuple<bool, double, size_t>> order;
   for (size_t i = 0; i < views.size(); ++i) {
     if (i == reference) continue;
-    order.emplace_back(options.scene_center
+    order.emplace_back(!MayCompare(*views[reference], *views[i]),
+                       options.scene_center
                            ? AngleAt(*options.scene_center, *views[reference], *views[i])
                            : (views[reference]->CenterInWorld() - views[i]->CenterInWorld()).norm(),
                        i);
@@ -86,7 +100,7 @@ std::vector<size_t> Neighbours(std::span<const View* const> views, size_t refere
     order.resize(static_cast<size_t>(std::max(1, options.neighbours)));
   }
   std::vector<size_t> nearest;
-  for (const auto& [distance, i] : order) nearest.push_back(i);
+  for (const auto& [last, distance, i] : order) nearest.push_back(i);
   return nearest;
 }
 

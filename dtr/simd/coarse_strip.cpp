@@ -92,6 +92,8 @@ struct Strip : CoarseStrip {
       const auto r = static_cast<float>(y - top);
       const float start = std::max({sides[0].StartAt(r), sides[1].StartAt(r), sides[2].StartAt(r)});
       const float end = std::min({sides[0].EndAt(r), sides[1].EndAt(r), sides[2].EndAt(r)});
+      // Corners near the plane of the eye lie so far aside that a side's crossing is no number.
+      if (!(start <= end)) continue;
       const int x1 = std::min(right, Floor(end - 0.5f));
       const int x0 = std::max(left, Ceil(start - 0.5f));
       float* row = RowAt(y) + x0;

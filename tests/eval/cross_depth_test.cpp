@@ -57,6 +57,22 @@ TEST(CrossDepth, AShiftedDepthIsMeasuredInPixels) {
   EXPECT_FALSE(report.passed());
 }
 
+TEST(CrossDepth, ViewsOfOnePointDoNotTestEachOther) {
+  // Without parallax any depth returns to where it came from: five views of one point, as of a
+  // panorama, would hide a depth that is wrong in all of them from the one beside them.
+  std::vector<View> views;
+  for (const double yaw : {0.0, 0.01, 0.02, -0.01, -0.02}) {
+    views.push_back(PlaneView(0, yaw, false));
+    for (float& z : views.back().depth.grid().data()) z = 1 / (1 / z + 2.0f / 90);
+  }
+  views.push_back(PlaneView(1, 0, false));
+  CrossDepthOptions options;
+  options.scene_center = Eigen::Vector3d(0, 0, 10);
+  const CrossDepthReport report = CrossDepth(Pointers(views), options);
+  EXPECT_FALSE(report.passed());
+  EXPECT_GT(report.views[0].p95_px, 1);
+}
+
 TEST(CrossDepth, AWrongPoseFails) {
   std::vector<View> views = FourViews(false);
   views[2].cam_from_world.translation.z() += 4;  // along the plane nothing would change

@@ -28,7 +28,7 @@ using ::testing::Contains;
 using ::testing::HasSubstr;
 
 constexpr int kPanoramas = 6;
-// Measured with 36 views of 204 px: 0.0004 m and 0.00025 rad; four times that.
+// Measured with 36 views of 244 px: 0.0004 m and 0.0003 rad; four times that.
 constexpr double kMaxCentreError = 0.0016, kMaxTurnRad = 0.001;
 
 class PanoramaBuild : public ::testing::Test {
@@ -39,7 +39,7 @@ class PanoramaBuild : public ::testing::Test {
     spec.scene = "room";
     spec.panoramas = true;
     spec.views = kPanoramas;
-    spec.width_px = 640;
+    spec.width_px = 768;
     spec.supersampling = 2;
     SilentProgress silent;
     datasets::MakeDataset(spec, *folder_ / "walk", 2, silent);
@@ -65,7 +65,7 @@ TEST_F(PanoramaBuild, ViewsOfAPanoramaStandInOnePointWhereTheyAre) {
   options.holdout = "0002";
   NotedLines lines;
   const BuildReport report = BuildSet(options, lines);
-  EXPECT_THAT(lines.lines, Contains(HasSubstr("6 panoramas split into 36 views of 204 x 204 px")));
+  EXPECT_THAT(lines.lines, Contains(HasSubstr("6 panoramas split into 36 views of 244 x 244 px")));
   EXPECT_TRUE(report.validation_passed) << report.set.validation_json;
   const DtrSet set = io::ReadSet(options.output);
   const auto& views = set.frames.front().views;
@@ -82,8 +82,8 @@ TEST_F(PanoramaBuild, ViewsOfAPanoramaStandInOnePointWhereTheyAre) {
     EXPECT_EQ(view.role == ViewRole::kHeldOut, panorama == "0002") << view.name;
     const auto [entry, fresh] = first_of.emplace(panorama, &view);
     EXPECT_LT((view.CenterInWorld() - entry->second->CenterInWorld()).norm(), 1e-9) << view.name;
-    EXPECT_DOUBLE_EQ(view.camera.fx_px(), 102);
-    EXPECT_DOUBLE_EQ(view.camera.cy_px(), 102);
+    EXPECT_DOUBLE_EQ(view.camera.fx_px(), 122);
+    EXPECT_DOUBLE_EQ(view.camera.cy_px(), 122);
     if (!fresh) continue;
     found.push_back(view.CenterInWorld());
     expected.push_back(true_pose.at(view.name).TargetOriginInSource());

@@ -8,6 +8,7 @@
 
 #include "calib/sfm/mapping/acceptance.h"
 #include "calib/sfm/mapping/adjust_map.h"
+#include "calib/sfm/mapping/adjust_stations.h"
 #include "calib/sfm/mapping/map_model.h"
 #include "calib/sfm/mapping/pair_selection.h"
 #include "calib/sfm/mapping/points.h"
@@ -56,7 +57,10 @@ void CheckGraph(const ViewGraph& graph) {
 // One run of the mapper; the members are what its steps pass on.
 class Mapper {
  public:
-  Mapper(const ViewGraph& graph, const MapOptions& options) : graph_(graph), options_(options) {}
+  Mapper(const ViewGraph& graph, const MapOptions& options)
+      : graph_(graph), options_(options), nodes_(NodesOf(graph)) {
+    for (const GraphImage& image : graph.images) stations_ = stations_ || image.station >= 0;
+  }
 
   Mapped Run() {
     for (const calib::LensCamera& camera : graph_.cameras) {
@@ -95,8 +99,9 @@ class Mapper {
   }
 
   void Place(const Rotations& rotations) {
-    const Positions positions = PlaceCameras(rotations.cam_from_world, cameras_.rays, tracks_,
-                                             options_.seed, options_.threads, options_.progress);
+    const Positions positions =
+        PlaceCameras(rotations.cam_from_world, cameras_.rays, nodes_, tracks_, options_.seed,
+                     options_.threads, options_.progress);
     mapped_.statistics.positioning_cost = positions.cost;
     cameras_.placed = rotations.connected;
     for (const Track& track : tracks_) {
@@ -193,7 +198,9 @@ class Mapper {
       if (images[c] > 0) scale = std::max(scale, LimitPx(1, cameras_.lenses[c]));
     }
     options.cauchy_px *= scale;
-    if (!AdjustMap(options, &bundle)) return false;
+    const bool adjusted = stations_ ? AdjustStations(graph_, nodes_, image_of, options, &bundle)
+                                    : AdjustMap(options, &bundle);
+    if (!adjusted) return false;
     TakeFromBundle(bundle, image_of, &cameras_, &points_);
     if (lenses) cameras_.rays = RaysOf(graph_, cameras_.lenses, options_.threads);
     return true;
@@ -305,6 +312,8 @@ class Mapper {
 
   const ViewGraph& graph_;
   const MapOptions& options_;
+  const std::vector<int> nodes_;
+  bool stations_ = false;  // some images belong to one
   int steps_done_ = 0;
   Mapped mapped_;
   MapCameras cameras_;

@@ -58,6 +58,7 @@ struct Mapped {
 ///      and distortion; principal points stay), with all tracks triangulated again in between
 ///   4. images that have no points are resected, or left out with the reason
 ///   5. acceptance (why_not)
+/// Images of one station are rotated and placed as one throughout; intrinsics must be known then.
 /// Same bytes for any number of threads. Throws std::invalid_argument where an index of the graph
 /// is out of range, a camera is none or a pixel is not finite.
 Mapped MapGlobally(const ViewGraph& graph, const MapOptions& options);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <numbers>
 #include <numeric>
 
@@ -15,6 +16,22 @@ namespace {
 constexpr double kMinSupport = 0.12;  // of a pair's triplets
 constexpr double kMaxMisfit = 5;      // standard deviations of a pair's own rotation
 constexpr int kFilterPasses = 2;
+
+using Eigen::Matrix3d;
+
+// The rotation of a pair as one of the nodes that its images belong to, whose world is that of
+// their station.
+RelativeRotation OfNodes(const ViewGraph& graph, const std::vector<int>& nodes,
+                         RelativeRotation rotation) {
+  const Matrix3d& a = graph.images[rotation.image_a].cam_from_station;
+  const Matrix3d& b = graph.images[rotation.image_b].cam_from_station;
+  rotation.b_from_a = b.transpose() * rotation.b_from_a * a;
+  rotation.b_translation_a = b.transpose() * rotation.b_translation_a;
+  rotation.covariance = b.transpose() * rotation.covariance * b;
+  rotation.image_a = nodes[rotation.image_a];
+  rotation.image_b = nodes[rotation.image_b];
+  return rotation;
+}
 
 // Keeps the pairs of the part with the most images (of equal ones, that with the first image).
 std::vector<char> LargestPart(int images, std::vector<RelativeRotation>* pairs) {
@@ -92,17 +109,29 @@ std::vector<double> SigmasOf(const ViewGraph& graph) {
   return sigmas;
 }
 
+std::vector<int> NodesOf(const ViewGraph& graph) {
+  std::map<int, int> first_of;
+  std::vector<int> nodes;
+  for (size_t i = 0; i < graph.images.size(); ++i) {
+    const int station = graph.images[i].station, image = static_cast<int>(i);
+    nodes.push_back(station < 0 ? image : first_of.emplace(station, image).first->second);
+  }
+  return nodes;
+}
+
 Rotations SelectPairs(const ViewGraph& graph, const Rays& rays, const MapOptions& options,
                       MapStatistics* statistics) {
   const auto images = static_cast<int>(graph.images.size());
   Rotations result;
+  const std::vector<int> nodes = NodesOf(graph);
   std::vector<RelativeRotation> pairs;
   bool parallax = false;
   for (auto& rotation :
        RelativeRotationsOf(graph, rays, SigmasOf(graph), options.threads, options.progress)) {
     if (!rotation || rotation->matches < kMinPairMatches) continue;
+    if (nodes[rotation->image_a] == nodes[rotation->image_b]) continue;
     parallax = parallax || graph.pairs[rotation->pair].kind != PairKind::kRotation;
-    pairs.push_back(std::move(*rotation));
+    pairs.push_back(OfNodes(graph, nodes, *rotation));
   }
   statistics->pairs = static_cast<int>(graph.pairs.size());
   statistics->pairs_without_rotation = statistics->pairs - static_cast<int>(pairs.size());
@@ -126,13 +155,20 @@ Rotations SelectPairs(const ViewGraph& graph, const Rays& rays, const MapOptions
       averaged = AverageRotations(images, pairs, support);
     }
     Summarise(averaged, statistics);
-    result.cam_from_world = std::move(averaged.cam_from_world);
+    for (int i = 0; i < images; ++i) {
+      const Matrix3d& of_node = averaged.cam_from_world[nodes[i]];
+      const bool is_node = graph.images[i].station < 0;
+      result.cam_from_world.push_back(is_node ? of_node
+                                              : graph.images[i].cam_from_station * of_node);
+    }
     if (pairs.empty()) result.why_not = "the rotations of all pairs disagree";
   }
   statistics->pairs_dropped = static_cast<int>(with_rotation - pairs.size());
   std::stable_sort(pairs.begin(), pairs.end(),
                    [](const auto& x, const auto& y) { return x.matches > y.matches; });
   for (const RelativeRotation& pair : pairs) result.pairs.push_back(pair.pair);
+  const std::vector<char> of_nodes = result.connected;
+  for (int i = 0; i < images; ++i) result.connected[i] = of_nodes[nodes[i]];
   result.left_out = LeftOutOf(graph, result.connected);
   return result;
 }

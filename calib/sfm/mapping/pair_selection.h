@@ -20,6 +20,10 @@ struct Rotations {
   std::string why_not;
 };
 
+/// What is rotated and placed as one: an image, or all images of a station. Nodes are called by the
+/// first of their images.
+std::vector<int> NodesOf(const ViewGraph& graph);
+
 /// Triplets, averaging, filtering, each followed by the largest connected part. Throws Interrupted.
 Rotations SelectPairs(const ViewGraph& graph, const Rays& rays, const MapOptions& options,
                       MapStatistics* statistics);

@@ -29,7 +29,7 @@ struct Seen {
 
 struct Problem {
   int cameras = 0;
-  std::vector<int> image_of;  // per camera
+  std::vector<int> node_of;   // per camera
   std::vector<size_t> first;  // per point, and one more
   std::vector<Seen> seen;
 };
@@ -40,7 +40,8 @@ struct State {
 };
 
 Problem MakeProblem(std::span<const Matrix3d> cam_from_world, const Rays& rays,
-                    std::span<const Track> tracks, const std::vector<int>& chosen) {
+                    std::span<const int> node_of, std::span<const Track> tracks,
+                    const std::vector<int>& chosen) {
   Problem problem;
   std::vector<int> camera_of(cam_from_world.size(), -1);
   problem.first.push_back(0);
@@ -48,11 +49,12 @@ Problem MakeProblem(std::span<const Matrix3d> cam_from_world, const Rays& rays,
     for (const TrackFeature& f : tracks[t]) {
       const Vector3d& ray = rays[f.image][f.feature];
       if (ray.isZero()) continue;
-      if (camera_of[f.image] < 0) {
-        camera_of[f.image] = problem.cameras++;
-        problem.image_of.push_back(f.image);
+      const int node = node_of[static_cast<size_t>(f.image)];
+      if (camera_of[node] < 0) {
+        camera_of[node] = problem.cameras++;
+        problem.node_of.push_back(node);
       }
-      problem.seen.push_back({camera_of[f.image], cam_from_world[f.image].transpose() * ray});
+      problem.seen.push_back({camera_of[node], cam_from_world[f.image].transpose() * ray});
     }
     problem.first.push_back(problem.seen.size());
   }
@@ -63,7 +65,7 @@ Problem MakeProblem(std::span<const Matrix3d> cam_from_world, const Rays& rays,
 State RandomStart(const Problem& problem, std::uint64_t seed) {
   State state;
   for (int c = 0; c < problem.cameras; ++c) {
-    Random random(HashOf(seed, static_cast<std::uint64_t>(problem.image_of[c])));
+    Random random(HashOf(seed, static_cast<std::uint64_t>(problem.node_of[c])));
     const double x = random.Uniform(-1, 1), y = random.Uniform(-1, 1);
     state.centres.emplace_back(x, y, random.Uniform(-1, 1));
   }
@@ -341,11 +343,11 @@ std::vector<int> CoveringTracks(int images, std::span<const Track> tracks, int p
 }
 
 Positions PlaceCameras(std::span<const Matrix3d> cam_from_world, const Rays& rays,
-                       std::span<const Track> tracks, std::uint64_t seed, int threads,
-                       const Progress* progress) {
+                       std::span<const int> node_of, std::span<const Track> tracks,
+                       std::uint64_t seed, int threads, const Progress* progress) {
   const auto images = static_cast<int>(cam_from_world.size());
-  const Problem problem =
-      MakeProblem(cam_from_world, rays, tracks, CoveringTracks(images, tracks, kTracksPerImage));
+  const Problem problem = MakeProblem(cam_from_world, rays, node_of, tracks,
+                                      CoveringTracks(images, tracks, kTracksPerImage));
   const Pattern pattern(problem);
   std::vector<State> states(kStarts);
   std::vector<double> costs(kStarts);
@@ -355,8 +357,11 @@ Positions PlaceCameras(std::span<const Matrix3d> cam_from_world, const Rays& ray
   });
   const auto best = std::min_element(costs.begin(), costs.end()) - costs.begin();
   Positions positions{std::vector<Vector3d>(images, Vector3d::Zero()), costs[best]};
-  for (int c = 0; c < problem.cameras; ++c) {
-    positions.centres[problem.image_of[c]] = states[best].centres[c];
+  std::vector<int> camera_of(images, -1);
+  for (int c = 0; c < problem.cameras; ++c) camera_of[problem.node_of[c]] = c;
+  for (int i = 0; i < images; ++i) {
+    const int camera = camera_of[node_of[static_cast<size_t>(i)]];
+    if (camera >= 0) positions.centres[i] = states[best].centres[camera];
   }
   return positions;
 }
