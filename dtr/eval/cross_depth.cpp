@@ -96,6 +96,10 @@ std::vector<size_t> Neighbours(std::span<const View* const> views, size_t refere
                        i);
   }
   std::sort(order.begin(), order.end());
+  // What cannot be compared takes no place where something can.
+  if (!order.empty() && !std::get<0>(order.front())) {
+    std::erase_if(order, [](const auto& candidate) { return std::get<0>(candidate); });
+  }
   if (order.size() > static_cast<size_t>(std::max(1, options.neighbours))) {
     order.resize(static_cast<size_t>(std::max(1, options.neighbours)));
   }

@@ -23,6 +23,9 @@ constexpr int kLanes = static_cast<int>(hn::MaxLanes(DF()));
 constexpr float kMarginPx = 1.0f / 256, kMinArea = 1e-6f;
 /// Pixel ranges never reach farther, so that they fit an int.
 constexpr float kFarPx = 1e6f;
+/// Of a direction whose z is 1 in its own view. Nearer to the plane of the eye a corner lies so far
+/// aside (beyond 89.4 degrees) that float does not hold what it spans: triangles are cut there.
+constexpr float kMinZ = 1e-2f;
 
 HWY_INLINE int Ceil(float value) {
   const float v = std::clamp(value, -1.0f, kFarPx);
@@ -47,7 +50,9 @@ struct FloatPlacement {
   Eigen::Vector3f At(float x, float y, float w) const {
     return from_grid.col(0) * x + from_grid.col(1) * y + from_grid.col(2) + from_centre * w;
   }
-  bool InFront(const Eigen::Vector3f& p, float w) const { return p.z() > 0 && p.z() >= near_z * w; }
+  bool InFront(const Eigen::Vector3f& p, float w) const {
+    return p.z() >= kMinZ && p.z() >= near_z * w;
+  }
 };
 
 struct Strip : CoarseStrip {
@@ -92,7 +97,6 @@ struct Strip : CoarseStrip {
       const auto r = static_cast<float>(y - top);
       const float start = std::max({sides[0].StartAt(r), sides[1].StartAt(r), sides[2].StartAt(r)});
       const float end = std::min({sides[0].EndAt(r), sides[1].EndAt(r), sides[2].EndAt(r)});
-      // Corners near the plane of the eye lie so far aside that a side's crossing is no number.
       if (!(start <= end)) continue;
       const int x1 = std::min(right, Floor(end - 0.5f));
       const int x0 = std::max(left, Ceil(start - 0.5f));
@@ -187,7 +191,8 @@ struct Strip : CoarseStrip {
       corner[k].p = placement.from_grid * Eigen::Vector3d(corners[k]->x, corners[k]->y, 1) +
                     placement.from_centre * w;
       corner[k].w = w;
-      corner[k].beyond = corner[k].p.z() - placement.near_z * w;
+      corner[k].beyond =
+          corner[k].p.z() - std::max(placement.near_z * w, static_cast<double>(kMinZ));
     }
     ScreenPoint polygon[4];
     int n = 0;
@@ -282,7 +287,7 @@ void ProjectImpl(const AdaptiveMesh& mesh, const GridPlacement& grid, ScreenPoin
     };
     const VF z = at(2), per_z = hn::Div(hn::Set(d, 1.0f), z);
     const auto in_front =
-        hn::And(hn::Gt(z, hn::Zero(d)), hn::Ge(z, hn::Mul(hn::Set(d, placement.near_z), vw)));
+        hn::And(hn::Ge(z, hn::Set(d, kMinZ)), hn::Ge(z, hn::Mul(hn::Set(d, placement.near_z), vw)));
     hn::Store(hn::Mul(at(0), per_z), d, x);
     hn::Store(hn::Mul(at(1), per_z), d, y);
     hn::Store(hn::IfThenElseZero(in_front, hn::Mul(vw, per_z)), d, w);

@@ -8,6 +8,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/depth_io.h"
+#include "dtr/io/heif_exif.h"
 #include "dtr/io/image_io.h"
 #include "tests/fuzz/readers.h"
 
@@ -47,7 +48,25 @@ Reader OpenJpeg(const fs::path& folder) {
   seeds.push_back(ReadFile(file, kSeedLimitBytes));
   io::WriteJpegWithExif(file, SomeImage(), 90, {5.0, 28.0, "Maker", "Model"});
   seeds.push_back(ReadFile(file, kSeedLimitBytes));
+  ImageRgb8 panorama(24, 12, 3);
+  io::WritePanoramaJpeg(file, panorama, 90);
+  seeds.push_back(ReadFile(file, kSeedLimitBytes));
   return ReaderOf(file, std::move(seeds));
+}
+
+// EXIF of HEIF is read by our own code; its pixels are libheif's affair.
+Reader OpenHeifExif(const fs::path& folder) {
+  const fs::path file = folder / "photo.heic";
+  OIIO::ImageSpec spec(64, 64, 3, OIIO::TypeDesc::UINT8);
+  spec.attribute("Make", "Maker");
+  spec.attribute("Exif:FocalLength", 4.25f);
+  const std::vector<std::uint8_t> pixels(64 * 64 * 3, 80);
+  const auto out = OIIO::ImageOutput::create(file.string());
+  if (!out || !out->open(file.string(), spec) ||
+      !out->write_image(OIIO::TypeDesc::UINT8, pixels.data()) || !out->close()) {
+    throw Error(file.string() + ": cannot be written: " + OIIO::geterror());
+  }
+  return {file, {ReadFile(file, kSeedLimitBytes)}, [=] { (void)io::ReadHeifExif(file); }, 0};
 }
 
 Reader OpenPng(const fs::path& folder) {
@@ -88,8 +107,11 @@ Reader OpenTiff(const fs::path& folder) {
   return ReaderOf(file, std::move(seeds));
 }
 
-constexpr ReaderKind kReaders[] = {
-    {"jpeg", OpenJpeg}, {"png", OpenPng}, {"exr", OpenExr}, {"tiff", OpenTiff}};
+constexpr ReaderKind kReaders[] = {{"jpeg", OpenJpeg},
+                                   {"heif_exif", OpenHeifExif},
+                                   {"png", OpenPng},
+                                   {"exr", OpenExr},
+                                   {"tiff", OpenTiff}};
 
 }  // namespace
 
