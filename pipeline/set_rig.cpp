@@ -108,15 +108,18 @@ double MovedPx(const View& view, const Pose& cam_from_world, const SparseScene& 
   return std::sqrt(squares / static_cast<double>(seen.size()));
 }
 
+void RequireRig(const fs::path& file, size_t cameras) {
+  if (cameras >= 2) return;
+  throw Error(fmt::format(
+      "`rig` {}: expected a rig of 2 cameras or more, found 1; one camera alone is for dtr "
+      "calibrate photos `lens`",
+      file.string()));
+}
+
 // Of another program, which has no board and no views.
 SetRig ForeignRig(const fs::path& file) {
   const calib::CameraFile cameras = calib::ReadCamerasOf(file);
-  if (cameras.cameras.size() < 2) {
-    throw Error(fmt::format(
-        "`rig` {}: expected a rig of 2 cameras or more, found 1; one camera alone is for dtr "
-        "calibrate photos `lens`",
-        file.string()));
-  }
+  RequireRig(file, cameras.cameras.size());
   SetRig rig;
   rig.file = file.filename().string();
   rig.unit = cameras.metric ? LengthUnit::kMetre : LengthUnit::kUnknown;
@@ -171,12 +174,7 @@ SetRig ReadSetRig(const fs::path& file) {
   }
   if (foreign) return ForeignRig(file);
   const calib::Calibration calibration = calib::ReadCalibration(file);
-  if (calibration.cameras.size() < 2) {
-    throw Error(fmt::format(
-        "`rig` {}: expected a rig of 2 cameras or more, found 1; one camera alone is for dtr "
-        "calibrate photos `lens`",
-        file.string()));
-  }
+  RequireRig(file, calibration.cameras.size());
   SetRig rig;
   rig.file = file.filename().string();
   rig.unit = calibration.board.metric ? LengthUnit::kMetre : LengthUnit::kUnknown;

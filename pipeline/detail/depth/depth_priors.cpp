@@ -150,7 +150,7 @@ DepthPriors::DepthPriors(const DepthPriorChoice& choice, std::span<const View* c
   for (const ViewPrior& view : report_.agreement.views) {
     report_.names.push_back(cameras_[static_cast<size_t>(view.view)].name);
   }
-  Judge(unit, progress);
+  Validate(unit, progress);
   priors_.resize(views.size());
   for (size_t source = 0; source < views.size(); ++source) {
     priors_[source] = {[this, source] { return Load(source); }, report_.agreement.expected};
@@ -174,7 +174,7 @@ void DepthPriors::Say(const std::string& line, Progress& progress) {
   progress.Note(line);
 }
 
-void DepthPriors::Judge(LengthUnit unit, Progress& progress) {
+void DepthPriors::Validate(LengthUnit unit, Progress& progress) {
   const stereo::PriorAgreement& found = report_.agreement;
   const std::string where = "`depth_prior` " + choice_.folder.string();
   if (found.points < stereo::kMinPriorPointsInAll) {

@@ -47,7 +47,7 @@ class DepthPriors {
 
  private:
   DepthImage Load(size_t source) const;
-  void Judge(LengthUnit unit, Progress& progress);
+  void Validate(LengthUnit unit, Progress& progress);
   void Say(const std::string& line, Progress& progress);
   void LeaveOutWhatDiffers(Progress& progress);
   void CorrectScale(LengthUnit unit, Progress& progress);
