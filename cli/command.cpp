@@ -43,6 +43,13 @@ void RejectWhatIsNoNumber(CLI::App& command) {
   }
 }
 
+/// Null in the program itself.
+const CalledApp* CallerOf(const CLI::App& app) {
+  const CLI::App* root = &app;
+  while (root->get_parent() != nullptr) root = root->get_parent();
+  return dynamic_cast<const CalledApp*>(root);
+}
+
 void RejectOutputs(const CLI::App& command, const std::string& json_target) {
   if (!json_target.empty() && json_target != "-") {
     RequireFolderOf(json_target, "--json");
@@ -63,6 +70,10 @@ void RejectOutputs(const CLI::App& command, const std::string& json_target) {
 }  // namespace
 
 void Context::EmitJson(const std::string& json) const {
+  if (common.json_text != nullptr) {
+    *common.json_text = json;
+    return;
+  }
   if (common.json_target.empty()) return;
   const std::string json_text = WithOptionNames(json);  // of the messages in it
   if (common.json_target == "-") {
@@ -102,7 +113,10 @@ void AddCommand(CLI::App& app, const std::string& name, const std::string& descr
   // The exit code leaves through CLI::RuntimeError, CLI11's way of ending with a code of one's own.
   command->callback([command, common, action] {
     RejectOutputs(*command, common->json_target);
-    Console console(common->json_target == "-");
+    const CalledApp* const called = CallerOf(*command);
+    if (called != nullptr) common->json_text = &called->json();
+    Console console =
+        called != nullptr ? Console(called->caller()) : Console(common->json_target == "-");
     const int code = action(Context{*common, console});
     if (code != kDone) throw CLI::RuntimeError(code);
   });

@@ -9,13 +9,15 @@
 #include <string>
 
 #include "cli/console.h"
+#include "dtr/base/progress.h"
 
 namespace dtr::cli {
 
 /// Options that every command takes.
 struct CommonOptions {
-  std::string json_target;  ///< "" none, "-" standard output, else a file
-  int threads = 0;          ///< 0: all cores
+  std::string json_target;           ///< "" none, "-" standard output, else a file
+  std::string* json_text = nullptr;  ///< of a command that another program calls: gets the JSON
+  int threads = 0;                   ///< 0: all cores
   std::uint64_t seed = 0;
 };
 
@@ -32,6 +34,19 @@ struct Context {
 
 /// Exit codes of the command line.
 enum ExitCode { kDone = 0, kFailed = 1, kWrongUsage = 2 };
+
+/// The commands of another program than `dtr` (run_command.h).
+class CalledApp : public CLI::App {
+ public:
+  /// Both must outlive it.
+  CalledApp(Progress& caller, std::string& json) : caller_(caller), json_(json) {}
+  Progress& caller() const { return caller_; }
+  std::string& json() const { return json_; }
+
+ private:
+  Progress& caller_;
+  std::string& json_;
+};
 
 /// Adds a sub-command. `prepare` declares its options on the CLI::App and returns the action; the
 /// action runs after parsing and returns the exit code.
@@ -68,5 +83,8 @@ void AddDatasetCommand(CLI::App& app);
 void AddJoinCommand(CLI::App& app);
 void AddSelftestCommand(CLI::App& app);
 void AddManualCommands(CLI::App& app, const std::string& version);  ///< of the whole of `app`
+
+/// All of these but those of windows, of measurements of the program itself, and about the program.
+void AddCallableCommands(CLI::App& app);
 
 }  // namespace dtr::cli

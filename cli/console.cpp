@@ -55,12 +55,15 @@ void CatchInterrupts() {
 Console::Console(bool json_on_stdout)
     : json_on_stdout_(json_on_stdout), terminal_(isatty(STDERR_FILENO) != 0) {}
 
+Console::Console(Progress& caller) : caller_(&caller) {}
+
 Console::~Console() {
   const std::lock_guard lock(mutex_);
   ClearBar();
 }
 
 void Console::Stage(const std::string& name, int total) {
+  if (caller_ != nullptr) return caller_->Stage(name, total);
   const std::lock_guard lock(mutex_);
   FinishStage();
   stage_ = name;
@@ -75,6 +78,7 @@ void Console::Stage(const std::string& name, int total) {
 }
 
 void Console::Update(int done) {
+  if (caller_ != nullptr) return caller_->Update(done);
   const std::lock_guard lock(mutex_);
   done_ = done;
   if (terminal_) {
@@ -87,12 +91,14 @@ void Console::Update(int done) {
 }
 
 void Console::Note(const std::string& line) {
+  if (caller_ != nullptr) return caller_->Note(line);
   const std::lock_guard lock(mutex_);
   ClearBar();
   fmt::print(stderr, "   {}\n", WithOptionNames(line));
 }
 
 void Console::Say(const std::string& line) {
+  if (caller_ != nullptr) return caller_->Note(line);
   const std::lock_guard lock(mutex_);
   ClearBar();
   const std::string text = WithOptionNames(line);
@@ -103,9 +109,12 @@ void Console::Say(const std::string& line) {
   }
 }
 
-bool Console::StopRequested() const { return g_interrupted != 0; }
+bool Console::StopRequested() const {
+  return caller_ != nullptr ? caller_->StopRequested() : g_interrupted != 0;
+}
 
 std::string Console::InterruptedLine() const {
+  if (caller_ != nullptr) return caller_->InterruptedLine();
   return keeps_work_ ? "interrupted; what was finished is saved, the same command continues"
                      : "interrupted; the same command starts from the beginning";
 }

@@ -13,6 +13,9 @@ namespace dtr::cli {
 class Console final : public Progress {
  public:
   explicit Console(bool json_on_stdout);
+  /// For a command that another program calls (run_command.h): `caller` receives all of it, Say()
+  /// as notes, and decides when to stop; nothing is printed. It must outlive the console.
+  explicit Console(Progress& caller);
   ~Console() override;
 
   void Stage(const std::string& name, int total) override;
@@ -32,9 +35,10 @@ class Console final : public Progress {
   void DrawBar();      // requires mutex_
   void ClearBar();     // requires mutex_
 
+  Progress* const caller_ = nullptr;
   std::mutex mutex_;
-  bool json_on_stdout_;
-  bool terminal_;
+  bool json_on_stdout_ = false;
+  bool terminal_ = false;
   bool keeps_work_ = false;
   std::string stage_;
   int total_ = 0, done_ = 0, told_tenths_ = 0;

@@ -11,11 +11,11 @@
 #include <sstream>
 #include <string>
 
+#include "cli/arguments.h"
 #include "cli/command.h"
 #include "cli/option_names.h"
 #include "cli/standard_output.h"
 #include "dtr/base/error.h"
-#include "dtr/base/utf8.h"
 
 namespace dtr::cli {
 namespace {
@@ -24,42 +24,15 @@ int Run(int argc, char** argv) {
   CLI::App app("dtr -- Depth + Texture Representation: photos in, novel views out");
   app.set_version_flag("--version", DTR_VERSION);
   app.require_subcommand(1);
-  AddBuildCommand(app);
-  AddCaptureCommand(app);
-  AddCalibrateCommand(app);
-  AddValidateCommand(app);
-  AddStereoCommand(app);
-  AddInfoCommand(app);
-  AddRenderCommand(app);
+  AddCallableCommands(app);
 #ifdef DTR_WITH_WINDOWS
   AddViewCommand(app);
 #endif
-  AddInspectCommand(app);
-  AddAdviseCommand(app);
-  AddEvaluateCommand(app);
   AddBenchCommand(app);
-  AddPruneCommand(app);
-  AddImportCommand(app);
-  AddExportCommand(app);
-  AddJoinCommand(app);
-  AddDatasetCommand(app);
   AddSelftestCommand(app);
   AddManualCommands(app, DTR_VERSION);
   LearnOptionNames(app);
-  // They come back in JSON and in the record of the run, which hold nothing else.
-  for (int i = 1; i < argc; ++i) {
-    std::string shown = argv[i];
-    // Messages are one line each.
-    const bool control = std::any_of(shown.begin(), shown.end(), [](char c) {
-      return static_cast<unsigned char>(c) < ' ' || c == '\x7f';
-    });
-    const bool utf8 = IsUtf8(argv[i]);
-    if (utf8 && !control) continue;
-    for (char& c : shown) c = c >= ' ' && c <= '~' ? c : '?';  // for any terminal
-    fmt::print(stderr, "dtr: argument {}: expected {}, found '{}'; rename the file or folder\n", i,
-               utf8 ? "no control characters" : "UTF-8", shown);
-    return kWrongUsage;
-  }
+  RequirePlainArguments({argv + std::min(argc, 1), argv + argc});
   // CLI11 would say that a command is missing, not that this one does not exist.
   const auto is_called = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
   if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(is_called).empty()) {

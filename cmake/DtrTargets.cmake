@@ -32,6 +32,15 @@ function(dtr_compile_options target)
   endif()
 endfunction()
 
+# The Python module is a shared library of all this. Nobody replaces our functions at load time, so calls
+# within a file need not allow for it.
+function(dtr_position_independent target)
+  if(DTR_HAS_PYTHON AND NOT CMAKE_POSITION_INDEPENDENT_CODE)
+    set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+    target_compile_options(${target} PRIVATE -fno-semantic-interposition)
+  endif()
+endfunction()
+
 # Most of a compile job is headers: Eigen, JSON, Ceres. Names in one batch must differ.
 function(dtr_unity target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ${DTR_UNITY} UNITY_BUILD_BATCH_SIZE 8)
@@ -59,6 +68,7 @@ function(dtr_library name)
   target_compile_features(${name} PUBLIC cxx_std_20)  # the headers need it, whoever includes them
   target_link_libraries(${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
   dtr_compile_options(${name})
+  dtr_position_independent(${name})
   install(TARGETS ${name} EXPORT dtrTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)
 endfunction()
 
