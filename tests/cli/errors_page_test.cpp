@@ -83,8 +83,9 @@ std::string AsShown(const std::string& literal) {
   return text.append(from, literal.end());
 }
 
-// The longest run without a {field} of fmt, less the punctuation around it.
-std::string LongestPiece(const std::vector<std::string>& literals) {
+// The longest run without a {field} of fmt, less the punctuation around it. `python`: fields are
+// shown as they are called.
+std::string LongestPiece(const std::vector<std::string>& literals, bool python) {
   std::string longest;
   const auto take = [&longest](std::string_view piece) {
     constexpr std::string_view kAround = " ,;:.'\"()";
@@ -94,7 +95,7 @@ std::string LongestPiece(const std::vector<std::string>& literals) {
     if (piece.size() > longest.size()) longest = piece;
   };
   for (const std::string& source : literals) {
-    const std::string literal = AsShown(source);
+    const std::string literal = python ? source : AsShown(source);
     size_t from = 0;
     for (size_t open = literal.find('{'); open != std::string::npos;
          open = literal.find('{', from)) {
@@ -112,7 +113,8 @@ std::vector<Thrown> ThrownBy(const fs::path& file) {
   for (const std::string start :
        {"throw Error(", "throw UsageError(", "throw dtr::Error(", "throw dtr::UsageError("}) {
     for (size_t at = source.find(start); at != std::string::npos; at = source.find(start, at + 1)) {
-      const std::string words = LongestPiece(Expression(source, at + start.size()).Literals());
+      const std::string words = LongestPiece(Expression(source, at + start.size()).Literals(),
+                                             file.generic_string().starts_with("python/"));
       if (words.size() < kMinLetters) continue;
       const auto line =
           1 + std::count(source.begin(), source.begin() + static_cast<long>(at), '\n');
@@ -125,7 +127,7 @@ std::vector<Thrown> ThrownBy(const fs::path& file) {
 std::vector<Thrown> EverythingThrown() {
   std::vector<Thrown> all;
   for (const char* folder :
-       {"calib", "capture", "cli", "datasets", "dtr", "pipeline", "stereo", "viewer"}) {
+       {"calib", "capture", "cli", "datasets", "dtr", "pipeline", "python", "stereo", "viewer"}) {
     for (const auto& entry : fs::recursive_directory_iterator(folder)) {
       const std::string extension = entry.path().extension().string();
       if (extension != ".cpp" && extension != ".h") continue;
