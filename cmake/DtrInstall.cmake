@@ -1,6 +1,6 @@
 # `cmake --install`: the program with man page and completion (component runtime), OpenSceneGraph's
-# plugin (osg), the libraries with headers and dtrConfig.cmake (dev). `cpack` makes two Debian packages:
-# dtr of the first two, libdtr-dev of the third.
+# plugin (osg), the libraries with headers and dtrConfig.cmake (dev), the Python package (python). `cpack`
+# makes Debian packages: dtr of the first two, libdtr-dev of the third, python3-dtr of the last.
 include(CMakePackageConfigHelpers)
 
 install(TARGETS dtr RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT runtime)
@@ -71,9 +71,26 @@ file(STRINGS scripts/packages.txt packages REGEX "^(lib.*-dev|nlohmann-json3-dev
 list(FILTER packages EXCLUDE REGEX "gtest|gmock|cli11")
 list(JOIN packages ", " packages)
 set(CPACK_DEBIAN_LIBRARIES_PACKAGE_DEPENDS "dtr (= ${PROJECT_VERSION}), ${packages}")
+if(DTR_HAS_PYTHON)
+  set(CPACK_DEBIAN_BINDINGS_DESCRIPTION
+    "The Python package dtr: D+TR sets as numpy arrays without copies, new views of
+them, and all jobs of the program (build, validate, evaluate, export) as calls.")
+  set(CPACK_DEBIAN_BINDINGS_PACKAGE_NAME python3-dtr)
+  set(CPACK_DEBIAN_BINDINGS_PACKAGE_SECTION python)
+  set(CPACK_DEBIAN_BINDINGS_PACKAGE_SHLIBDEPS ON)
+  # The module is for one minor version of Python.
+  math(EXPR next_python "${Python3_VERSION_MINOR} + 1")
+  set(CPACK_DEBIAN_BINDINGS_PACKAGE_DEPENDS "python3 (>= 3.${Python3_VERSION_MINOR}), python3 (<< 3.${next_python}), python3-numpy, ffmpeg")
+  set(CPACK_DEBIAN_BINDINGS_PACKAGE_RECOMMENDS "python3-matplotlib, colmap (>= 3.8), libegl1, libgl1-mesa-dri, libegl-mesa0")
+  set(CPACK_DEBIAN_BINDINGS_PACKAGE_SUGGESTS "dtr, jupyter-notebook")
+endif()
 include(CPack)
 cpack_add_component(runtime GROUP program)
 cpack_add_component(osg GROUP program)
 cpack_add_component(dev GROUP libraries)
+if(DTR_HAS_PYTHON)
+  cpack_add_component(python GROUP bindings)
+  cpack_add_component_group(bindings)
+endif()
 cpack_add_component_group(program)
 cpack_add_component_group(libraries)

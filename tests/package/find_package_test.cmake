@@ -39,6 +39,13 @@ run(${WORK}/examples/point_cloud ${WORK}/plane.dtr 0001 ${WORK}/cloud.ply)
 if(NOT output MATCHES "cloud.ply: 3[0-9][0-9][0-9] points")
   message(FATAL_ERROR "point_cloud: expected a point for every pixel of 64 x 48, found\n${output}")
 endif()
+if(PYTHON)
+  run(${CMAKE_COMMAND} -E env PYTHONPATH=${prefix}/${PYTHON_DIR} PYTHONDONTWRITEBYTECODE=1 ${PYTHON} -c
+    "import dtr, sys; s = dtr.load(sys.argv[1]); print(dtr.__file__, s.views[0].depth.shape)" ${WORK}/plane.dtr)
+  if(NOT output MATCHES "${prefix}/${PYTHON_DIR}/dtr/__init__.py .48, 64.")
+    message(FATAL_ERROR "python: expected the installed package and depth of 48 x 64, found\n${output}")
+  endif()
+endif()
 # Photos to set needs COLMAP and minutes; here it must link, and say what it wants.
 execute_process(COMMAND ${WORK}/examples/photos_to_set ${WORK}/nothing ${WORK}/x.dtr
   RESULT_VARIABLE code ERROR_VARIABLE output)
