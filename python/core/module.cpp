@@ -315,6 +315,17 @@ void AddView(py::module_& module) {
       .def("_unproject", &UnprojectView, py::arg("completed"))
       .def("_address", &AddressOf, py::arg("plane"),
            "Where the set has these pixels in memory, for tests.")
+      .def("__eq__",
+           [](const SetView& a, const py::object& other) {
+             if (!py::isinstance<SetView>(other)) return false;
+             const auto& b = other.cast<const SetView&>();
+             return a.set == b.set && a.at.time_step == b.at.time_step && a.at.view == b.at.view;
+           })
+      .def("__hash__",
+           [](const SetView& v) {
+             return py::hash(py::make_tuple(reinterpret_cast<std::uintptr_t>(v.set.get()),
+                                            v.at.time_step, v.at.view));
+           })
       .def("__repr__", [](const SetView& v) {
         return "<dtr.View " + v.view().name + ", " + NameOf(v.view().role) + ", " +
                std::to_string(v.view().camera.width_px()) + "x" +

@@ -1,5 +1,6 @@
 #include "python/core/open_set.h"
 
+#include <algorithm>
 #include <atomic>
 #include <utility>
 
@@ -76,13 +77,20 @@ Floats OpenSet::FloatsOf(ViewPlace at, Plane plane) {
                        : plane == Plane::kCompletedDepth ? slot.completed
                                                          : slot.sigma;
   if (!cell.read) {
-    cell.pixels = FloatsIn(ReadPlane(folder_, view(at), plane), plane);
+    View read = ReadPlane(folder_, view(at), plane);
+    if (plane == Plane::kCompletedDepth && !slot.depth.read) {  // both were decoded
+      slot.depth = {true, Shared(std::move(MeasuredDepth(read).grid()))};
+    }
+    cell.pixels = FloatsIn(std::move(read), plane);
     cell.read = true;
   }
   return cell.pixels;
 }
 
-void OpenSet::Load(const std::vector<Plane>& planes, int threads, Progress& progress) {
+void OpenSet::Load(std::vector<Plane> planes, int threads, Progress& progress) {
+  // With completed depth comes the measured one.
+  std::stable_partition(planes.begin(), planes.end(),
+                        [](Plane plane) { return plane == Plane::kCompletedDepth; });
   std::vector<ViewPlace> places;
   for (size_t step = 0; step < set_.frames.size(); ++step) {
     for (size_t i = 0; i < set_.frames[step].views.size(); ++i) places.push_back({step, i});

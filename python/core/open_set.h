@@ -48,7 +48,7 @@ class OpenSet {
 
   /// Reads these planes of every view that are not there yet, on `threads` threads (0: all cores).
   /// Throws Interrupted where `progress` asks for it.
-  void Load(const std::vector<Plane>& planes, int threads, Progress& progress);
+  void Load(std::vector<Plane> planes, int threads, Progress& progress);
 
   /// Forgets all pixels; those that somebody else still has stay with them.
   void DropPixels();

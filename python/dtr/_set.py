@@ -87,6 +87,9 @@ class Set:
     def __init__(self, opened: _core.OpenSet, path: str) -> None:
         self._open = opened
         self._path = path
+        self._time_steps = tuple(
+            TimeStep(time, tuple(views)) for time, views in zip(opened.times_s, opened.views())
+        )
 
     # ---- description
 
@@ -123,22 +126,21 @@ class Set:
         return result
 
     @property
-    def time_steps(self) -> list[TimeStep]:
+    def time_steps(self) -> tuple[TimeStep, ...]:
         """All of them, in order."""
-        times = self._open.times_s
-        return [TimeStep(t, tuple(v)) for t, v in zip(times, self._open.views())]
+        return self._time_steps
 
     @property
-    def views(self) -> list[View]:
+    def views(self) -> tuple[View, ...]:
         """Those of the first time step, held-out ones too."""
-        return self._open.views()[0]
+        return self._time_steps[0].views if self._time_steps else ()
 
     def view(self, name: str, time_step: int = 0) -> View:
         """The view of that photo, with or without its extension. Raises UsageError."""
         _require_count("time_step", time_step)
         with python_messages():
             index = self._open.index_of(name, time_step)
-        return self._open.views()[time_step][index]
+        return self._time_steps[time_step].views[index]
 
     # ---- pixels
 
@@ -292,7 +294,9 @@ class Set:
 
     # ---- notebooks
 
-    def page(self, path: Optional[PathLike] = None, *, height: int = 600, **options: Any) -> _notebook.Page:
+    def page(
+        self, path: Optional[PathLike] = None, *, height: int = 600, **options: Any
+    ) -> _notebook.Page:
         """The web page of the set (`export("web", ...)`), which Jupyter shows in an IFrame.
 
         path: where the HTML file is kept; None: it lives as long as what is returned. height of the

@@ -41,7 +41,10 @@ class Description(WithSet):
     def test_views_by_name(self):
         s = dtr.load(self.path)
         name = s.views[2].name
-        self.assertEqual(s.view(name).id, s.views[2].id)
+        self.assertEqual(s.view(name), s.views[2])
+        self.assertNotEqual(s.view(name), dtr.load(self.path).view(name))  # of another set
+        self.assertNotEqual(s.views[1], s.views[2])
+        self.assertEqual(len(set(s.views) | {s.view(name)}), 6)
         self.assertEqual(s.view(name.rsplit(".", 1)[0]).name, name)
 
 
@@ -65,6 +68,14 @@ class Arrays(WithSet):
         self.assertEqual(view.completed_depth.dtype, np.float32)
         self.assertIsNone(view.mask)
         self.assertIsNone(view.sigma)
+
+    def test_measured_depth_is_the_same_in_any_order(self):
+        a, b = dtr.load(self.path), dtr.load(self.path)
+        first = a.views[1].depth, a.views[1].completed_depth
+        second = b.views[1].completed_depth, b.views[1].depth
+        np.testing.assert_array_equal(first[0], second[1])
+        np.testing.assert_array_equal(first[1], second[0])
+        self.assertEqual(b.views[1].depth.ctypes.data, b.views[1]._address("depth"))
 
     def test_cannot_be_written(self):
         view = dtr.load(self.path).view("0001")
