@@ -29,7 +29,7 @@ class Build(WithSet):
     def setUpClass(cls):
         super().setUpClass()
         cls.photos = cls.folder / "photos"
-        make_courtyard(cls.photos, views=7, width=192, height=128)
+        make_courtyard(cls.photos, views=6, width=144, height=96)
 
     def build(self, output, **options):
         return dtr.build(self.photos / "images", output, poses=self.photos / "cameras.json", preset="fast",
@@ -86,7 +86,7 @@ class Build(WithSet):
         self.assertFalse(output.exists())
         self.assertTrue(output.with_name("interrupted.dtr.partial").exists())
         s = self.build(output)
-        self.assertEqual(len(s.views), 7)
+        self.assertEqual(len(s.views), 6)
         self.assertFalse(output.with_name("interrupted.dtr.partial").exists())
         # As if nobody had interrupted it.
         undisturbed = self.build(self.folder / "undisturbed.dtr")
