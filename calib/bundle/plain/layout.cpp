@@ -3,14 +3,17 @@
 #include <Eigen/OrderingMethods>
 #include <Eigen/SparseCore>
 #include <algorithm>
+#include <numeric>
 
 namespace dtr::calib::plain {
 namespace {
 
 constexpr size_t kTableNodes = 2048;  // up to here pairs are looked up in a table: 16 MB
 constexpr long kAlwaysDense = 600;    // unknowns: a dense factorisation takes some 20 ms
-constexpr long kNeverDense = 8000;    // 512 MB
-constexpr double kSparseShare = 0.3;  // of all pairs of nodes that have a block
+// What solutions cost, in multiplications of a sparse factorisation: dense ones, and a point's
+// blocks, run so many times as fast; conjugate gradients take so many products with an
+// observation's block.
+constexpr double kDenseSpeed = 8, kBlockSpeed = 3, kProducts = 80;
 
 // The nodes of a point's observations: images, then lenses; each once, rising.
 void NodesOfPoint(const Problem& problem, const Layout& layout, size_t point,
@@ -32,26 +35,48 @@ void SortUnique(std::vector<std::uint32_t>& values) {
   values.erase(std::unique(values.begin(), values.end()), values.end());
 }
 
-// Nodes above each that a point connects it with, itself first.
-std::vector<std::vector<std::uint32_t>> Neighbours(const Problem& problem, const Layout& layout) {
-  std::vector<std::vector<std::uint32_t>> above(layout.nodes());
-  std::vector<size_t> tidy(layout.nodes(), 64);  // length at which duplicates are removed
-  std::vector<std::uint32_t> nodes;
-  for (size_t p = 0; p < problem.points(); ++p) {
-    NodesOfPoint(problem, layout, p, nodes);
-    for (size_t a = 0; a < nodes.size(); ++a) {
-      auto& row = above[nodes[a]];
-      row.insert(row.end(), nodes.begin() + static_cast<long>(a), nodes.end());
-      if (row.size() < tidy[nodes[a]]) continue;
-      SortUnique(row);
-      tidy[nodes[a]] = std::max<size_t>(64, 2 * row.size());
+// In the order of elimination: multiplications of a sparse factorisation. `graph`: both triangles.
+// The symbolic part of Davis 2005 (LDL, sec. 2): row by row the columns that it fills.
+double SparseWork(const Eigen::SparseMatrix<double>& graph, const std::vector<int>& order,
+                  const Layout& layout) {
+  const size_t count = order.size();
+  std::vector<size_t> place(count), parent(count, count), mark(count, count);
+  std::vector<double> below(count);  // unknowns of the rows that a column fills
+  for (size_t k = 0; k < count; ++k) place[static_cast<size_t>(order[k])] = k;
+  for (size_t k = 0; k < count; ++k) {
+    mark[k] = k;
+    for (Eigen::SparseMatrix<double>::InnerIterator it(graph, order[k]); it; ++it) {
+      for (size_t i = place[static_cast<size_t>(it.row())]; i < k && mark[i] != k; i = parent[i]) {
+        if (parent[i] == count) parent[i] = k;
+        below[i] += layout.size(static_cast<size_t>(order[k]));
+        mark[i] = k;
+      }
     }
   }
-  for (size_t a = 0; a < above.size(); ++a) {
-    above[a].push_back(static_cast<std::uint32_t>(a));  // every node has its own block
-    SortUnique(above[a]);
+  double work = 0;
+  for (size_t k = 0; k < count; ++k) {
+    work += layout.size(static_cast<size_t>(order[k])) * below[k] * below[k];
   }
-  return above;
+  return work;
+}
+
+// The order of elimination that fills little (approximate minimum degree), and its SparseWork.
+double OrderSparsely(const std::vector<std::vector<std::uint32_t>>& above, const Layout& layout,
+                     std::vector<int>& order) {
+  std::vector<Eigen::Triplet<double>> entries;
+  for (size_t low = 0; low < above.size(); ++low) {
+    for (const std::uint32_t high : above[low]) {
+      entries.emplace_back(static_cast<int>(low), static_cast<int>(high), 1.0);
+      if (low != high) entries.emplace_back(static_cast<int>(high), static_cast<int>(low), 1.0);
+    }
+  }
+  const auto side = static_cast<int>(above.size());
+  Eigen::SparseMatrix<double> graph(side, side);
+  graph.setFromTriplets(entries.begin(), entries.end());
+  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> eliminated;
+  Eigen::AMDOrdering<int>()(graph, eliminated);
+  order.assign(eliminated.indices().data(), eliminated.indices().data() + side);
+  return SparseWork(graph, order, layout);
 }
 
 }  // namespace
@@ -64,12 +89,46 @@ Layout::Layout(const Problem& problem) : images_(problem.images()) {
     size_.push_back(static_cast<int>(free.size()));
     lenses_move_ = lenses_move_ || !free.empty();
   }
-  FindBlocks(problem);
-  OrderNodes();
+  for (const int size : size_) unknowns_ += size;
+  const Neighbours above = NeighboursOf(problem);
+  Choose(problem, above);
+  StoreBlocks(solution_ == Solution::kIterative ? NeighboursWithoutPoints(problem) : above);
 }
 
-void Layout::FindBlocks(const Problem& problem) {
-  const auto above = Neighbours(problem, *this);
+// Nodes above each that a point connects it with, itself first.
+Layout::Neighbours Layout::NeighboursOf(const Problem& problem) const {
+  Neighbours above(nodes());
+  std::vector<size_t> tidy(nodes(), 64);  // length at which duplicates are removed
+  std::vector<std::uint32_t> of_point;
+  for (size_t p = 0; p < problem.points(); ++p) {
+    NodesOfPoint(problem, *this, p, of_point);
+    for (size_t a = 0; a < of_point.size(); ++a) {
+      auto& row = above[of_point[a]];
+      row.insert(row.end(), of_point.begin() + static_cast<long>(a), of_point.end());
+      if (row.size() < tidy[of_point[a]]) continue;
+      SortUnique(row);
+      tidy[of_point[a]] = std::max<size_t>(64, 2 * row.size());
+    }
+  }
+  for (size_t a = 0; a < above.size(); ++a) {
+    above[a].push_back(static_cast<std::uint32_t>(a));  // every node has its own block
+    SortUnique(above[a]);
+  }
+  return above;
+}
+
+Layout::Neighbours Layout::NeighboursWithoutPoints(const Problem& problem) const {
+  Neighbours above(nodes());
+  for (size_t a = 0; a < nodes(); ++a) {
+    above[a].push_back(static_cast<std::uint32_t>(a));
+    if (!IsLens(a) && lenses_move_) {
+      above[a].push_back(static_cast<std::uint32_t>(LensNode(problem.LensOf(a))));
+    }
+  }
+  return above;
+}
+
+void Layout::StoreBlocks(const Neighbours& above) {
   row_.assign(nodes() + 1, 0);
   for (size_t a = 0; a < nodes(); ++a) {
     row_[a] = blocks_.size();
@@ -95,26 +154,28 @@ size_t Layout::Begin(size_t low, size_t high) const {
       ->begin;
 }
 
-void Layout::OrderNodes() {
-  for (const int size : size_) unknowns_ += size;
-  const auto all = static_cast<double>(nodes());
-  const double share = static_cast<double>(blocks_.size()) / (0.5 * all * (all + 1));
-  sparse_ = unknowns_ > kNeverDense || (unknowns_ > kAlwaysDense && share < kSparseShare);
+// The solution, and the order of elimination.
+void Layout::Choose(const Problem& problem, const Neighbours& above) {
   std::vector<int> order(nodes());
-  for (size_t k = 0; k < order.size(); ++k) order[k] = static_cast<int>(k);
-  if (sparse_) {
-    std::vector<Eigen::Triplet<double>> entries;
-    for (const Block& block : blocks_) {
-      const int low = static_cast<int>(block.low), high = static_cast<int>(block.high);
-      entries.emplace_back(low, high, 1.0);
-      if (low != high) entries.emplace_back(high, low, 1.0);
+  std::iota(order.begin(), order.end(), 0);
+  if (unknowns_ > kAlwaysDense) {
+    const auto side = static_cast<double>(unknowns_);
+    const double dense = side * side * side / 3 / kDenseSpeed;
+    std::vector<int> sparse_order;
+    const double sparse = OrderSparsely(above, *this, sparse_order);
+    const double block = camera_size_ * 3.0;
+    double blocks = 0;
+    for (size_t p = 0; p < problem.points(); ++p) {
+      const auto images = static_cast<double>(problem.first(p + 1) - problem.first(p));
+      blocks += 0.5 * images * images * block * camera_size_ / kBlockSpeed;
     }
-    const auto side = static_cast<int>(nodes());
-    Eigen::SparseMatrix<double> graph(side, side);
-    graph.setFromTriplets(entries.begin(), entries.end());
-    Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> eliminated;
-    Eigen::AMDOrdering<int>()(graph, eliminated);
-    for (int k = 0; k < side; ++k) order[static_cast<size_t>(k)] = eliminated.indices()[k];
+    const double iterative = kProducts * block * static_cast<double>(problem.seen().size());
+    if (camera_size_ > 0 && std::min(dense, sparse) + blocks > iterative) {
+      solution_ = Solution::kIterative;
+    } else if (sparse < dense) {
+      solution_ = Solution::kSparse;
+      order = std::move(sparse_order);
+    }
   }
   offset_.assign(nodes(), 0);
   long next = 0;

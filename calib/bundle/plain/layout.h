@@ -10,9 +10,14 @@
 
 namespace dtr::calib::plain {
 
+/// How the reduced system is solved: by Cholesky's factorisation, dense or sparse, or, where that
+/// and its blocks would take longer, by conjugate gradients.
+enum class Solution { kDense, kSparse, kIterative };
+
 /// The reduced system consists of nodes: the images, then the lenses. Of two nodes that a point
 /// connects there is a block, the lower node's unknowns down, the higher's across, row-major;
-/// lenses' sides are padded to kMaxFree. Only blocks of lower-or-equal, higher are stored.
+/// lenses' sides are padded to kMaxFree. Only blocks of lower-or-equal, higher are stored; of a
+/// system that is solved iteratively only a node's own and those of an image with its lens.
 class Layout {
  public:
   explicit Layout(const Problem& problem);
@@ -26,7 +31,7 @@ class Layout {
   int width(size_t node) const { return IsLens(node) ? kMaxFree : camera_size_; }
   long unknowns() const { return unknowns_; }
   long offset(size_t node) const { return offset_[node]; }  ///< in the order of elimination
-  bool sparse() const { return sparse_; }
+  Solution solution() const { return solution_; }
 
   /// Every block: its two nodes and where it begins.
   struct Block {
@@ -39,12 +44,16 @@ class Layout {
   size_t Begin(size_t low, size_t high) const;
 
  private:
-  void FindBlocks(const Problem& problem);
-  void OrderNodes();
+  using Neighbours = std::vector<std::vector<std::uint32_t>>;
+  Neighbours NeighboursOf(const Problem& problem) const;
+  Neighbours NeighboursWithoutPoints(const Problem& problem) const;
+  void StoreBlocks(const Neighbours& above);
+  void Choose(const Problem& problem, const Neighbours& above);
 
   size_t images_ = 0;
   int camera_size_ = 0;
-  bool lenses_move_ = false, sparse_ = false;
+  bool lenses_move_ = false;
+  Solution solution_ = Solution::kDense;
   std::vector<int> size_;
   std::vector<long> offset_;
   long unknowns_ = 0;

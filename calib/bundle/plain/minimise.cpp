@@ -8,6 +8,7 @@
 #include "calib/bundle/plain/normal.h"
 #include "calib/bundle/plain/place_points.h"
 #include "calib/bundle/plain/reduced.h"
+#include "dtr/base/parallel_for.h"
 
 namespace dtr::calib::plain {
 namespace {
@@ -16,6 +17,10 @@ namespace {
 constexpr double kMinLambda = 1e-12, kMaxLambda = 1e12;
 constexpr double kMinRatio = 1e-3;   // of gained to promised, for a step to be taken
 constexpr double kGoodRatio = 0.75;  // the model holds: less damping
+// The model of a robust cost lies above it: steps are too short. Those of lenses may be far too
+// long. Beyond these ratios another length is tried: the right one if the cost were a parabola
+// along it.
+constexpr double kFarRatio = 1.3, kNearRatio = 0.25, kMaxLength = 4;
 
 // exp(step) exp(motion), and the centre moved.
 void MovePose(const double* step, std::array<double, 6>& motion) {
@@ -57,6 +62,29 @@ Unknowns Stepped(const Problem& problem, const Layout& layout, const Unknowns& x
     for (size_t k = 0; k < 3; ++k) next.place[p][k] += points[p][k];
   }
   return next;
+}
+
+// The cost at `next`, a step from `x`. Of thousands of points one or another always steps behind a
+// camera, where it has no pixel: one that is far away, or whose matches are wrong. It would have
+// the step of all rejected, again and again; so it takes the largest part of its own step that
+// keeps it in view.
+double CostInView(const Problem& problem, const Unknowns& x, int threads, Unknowns& next) {
+  const double cost = problem.CostAt(next, threads);
+  if (std::isfinite(cost)) return cost;
+  const std::vector<Camera> cameras = problem.CamerasAt(next);
+  const std::vector<Intrinsics> lenses = problem.IntrinsicsAt(next);
+  const size_t chunks = (problem.points() + kChunkPoints - 1) / kChunkPoints;
+  ParallelFor(0, static_cast<int>(chunks), threads, [&](int chunk) {
+    const size_t begin = static_cast<size_t>(chunk) * kChunkPoints;
+    for (size_t p = begin; p < std::min(begin + kChunkPoints, problem.points()); ++p) {
+      const std::array<double, 3> from = x.place[p], to = next.place[p];
+      for (const double part : {1.0, 0.5, 0.25, 0.125, 0.0}) {
+        for (size_t k = 0; k < 3; ++k) next.place[p][k] = from[k] + part * (to[k] - from[k]);
+        if (std::isfinite(problem.PointCost(p, next.place[p], cameras, lenses))) break;
+      }
+    }
+  });
+  return problem.CostAt(next, threads);
 }
 
 // lambda, and by what it grows when a step fails (Ceres' rule for its radius).
@@ -102,7 +130,7 @@ MinimiseResult Minimise(const Problem& problem, const MinimiseOptions& options, 
   const bool robust = problem.loss().scale2 > 0;
   if (robust) result.cost = SettlePoints(problem, options, x);
   NormalEquations normal(problem, layout);
-  ReducedSolver solver(layout);
+  ReducedSolver solver(problem, layout);
   Damping damping{options.start_lambda};
   double before = 0;  // promised by the step before; 0: none
   std::vector<std::array<double, 3>> points;
@@ -110,7 +138,7 @@ MinimiseResult Minimise(const Problem& problem, const MinimiseOptions& options, 
     if (options.progress != nullptr) options.progress->ThrowIfInterrupted();
     ++result.iterations;
     normal.Build(x, damping.lambda, options.threads);
-    const auto step = solver.Solve(normal.blocks(), normal.right());
+    const auto step = solver.Solve(normal, options.threads);
     if (!step) {
       damping.Reject();
       continue;
@@ -122,9 +150,18 @@ MinimiseResult Minimise(const Problem& problem, const MinimiseOptions& options, 
     const double next_promised = promised * (before > 0 ? std::min(1.0, promised / before) : 1);
     const bool last = next_promised <= options.cost_tolerance * result.cost || promised <= hidden;
     Unknowns next = Stepped(problem, layout, x, *step, points);
-    const double cost = problem.CostAt(next, options.threads);
+    double cost = CostInView(problem, x, options.threads, next);
     const double ratio = promised > 0 ? (result.cost - cost) / promised : 0;
-    if (cost <= result.cost && (last || ratio > kMinRatio)) {
+    if (((robust && ratio > kFarRatio) || ratio < kNearRatio) && std::isfinite(cost) && !last) {
+      const double length = std::min(kMaxLength, 1 / std::max(2 - ratio, 1 / kMaxLength));
+      for (auto& point : points) {
+        for (double& p : point) p *= length;
+      }
+      Unknowns other = Stepped(problem, layout, x, length * *step, points);
+      const double other_cost = CostInView(problem, x, options.threads, other);
+      if (other_cost < cost) cost = other_cost, next = std::move(other);
+    }
+    if (cost <= result.cost && (last || result.cost - cost > kMinRatio * promised)) {
       x = std::move(next);
       result.cost = robust ? SettlePoints(problem, options, x) : cost;
       damping.Accept(ratio);

@@ -74,6 +74,7 @@ class NormalEquations::Part {
         cameras_(cameras),
         lenses_(lenses),
         lambda_(lambda),
+        eliminates_(layout_.solution() != Solution::kIterative),
         sums_(sums) {
     std::fill(sums_.blocks.begin(), sums_.blocks.end(), 0.0);
     sums_.right.setZero(), sums_.gradient.setZero(), sums_.diagonal.setZero();
@@ -248,7 +249,7 @@ class NormalEquations::Part {
     const double* const cross = CameraCross(first + i);
     AddOuter<kCamera, kCamera>(row.camera, row.camera,
                                blocks + layout_.Begin(row.image, row.image));
-    for (size_t j = i; j < rows_.size(); ++j) {
+    for (size_t j = i; j < rows_.size() && eliminates_; ++j) {
       double* const block = blocks + layout_.Begin(row.image, rows_[j].image);
       SubtractOuter<kCamera, kCamera>(cross, CameraCross(first + j), block);
       // An image that sees the point twice.
@@ -260,6 +261,7 @@ class NormalEquations::Part {
       AddOuter<kCamera, kMaxFree>(row.camera, row.lens,
                                   blocks + layout_.Begin(row.image, layout_.LensNode(row.lens_of)));
       for (const size_t slot : slots_) {
+        if (!eliminates_) break;
         SubtractOuter<kCamera, kMaxFree>(
             cross, LensCross(first + slot),
             blocks + layout_.Begin(row.image, layout_.LensNode(rows_[slot].lens_of)));
@@ -281,7 +283,7 @@ class NormalEquations::Part {
     const double* const cross = LensCross(first + slots_[s]);
     for (const size_t slot : slots_) {
       const size_t other = layout_.LensNode(rows_[slot].lens_of);
-      if (other < node) continue;
+      if (other < node || !eliminates_) continue;
       SubtractOuter<kMaxFree, kMaxFree>(cross, LensCross(first + slot),
                                         sums_.blocks.data() + layout_.Begin(node, other));
     }
@@ -312,6 +314,7 @@ class NormalEquations::Part {
   const std::vector<Camera>& cameras_;
   const std::vector<Intrinsics>& lenses_;
   const double lambda_;
+  const bool eliminates_;  // the points, from the blocks too
   Sums& sums_;
   std::vector<Row<kCamera>> rows_;
   std::vector<size_t> slots_;

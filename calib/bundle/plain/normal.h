@@ -19,7 +19,8 @@ struct EliminatedPoint {
 /// Gauss-Newton's normal equations H x = -g of a Problem at some unknowns, damped by lambda times
 /// their diagonal (Levenberg 1944, Marquardt 1963), the points eliminated (Schur complement; Triggs
 /// et al. 2000, sec. 6.1). With L L^T a point's block and A = (derivatives by a node)^T (by the
-/// point) L^-T, the reduced matrix is H_ab - sum of A_a A_b^T.
+/// point) L^-T, the reduced matrix is H_ab - sum of A_a A_b^T. Of an iterative solution blocks()
+/// has H alone.
 class NormalEquations {
  public:
   NormalEquations(const Problem& problem, const Layout& layout);
@@ -32,6 +33,16 @@ class NormalEquations {
   const Eigen::VectorXd& right() const { return sum_.right; }        ///< of the reduced system
   const Eigen::VectorXd& gradient() const { return sum_.gradient; }  ///< of cameras and lenses
   const Eigen::VectorXd& damping() const { return damping_; }        ///< lambda times diagonal
+
+  /// Of an observation: A of its image, `camera_size` x 3, and, of the point's first observation
+  /// through a lens, A of that lens, kMaxFree x 3, else null; both column by column.
+  const double* CameraCross(size_t observation) const {
+    return camera_cross_.data() + observation * 3 * static_cast<size_t>(layout_.camera_size());
+  }
+  const double* LensCross(size_t observation) const {
+    if (!layout_.lenses_move() || !lens_first_[observation]) return nullptr;
+    return lens_cross_.data() + observation * 3 * kMaxFree;
+  }
 
   /// The points' steps that go with a step of cameras and lenses; adds to `decrease` what the model
   /// of the cost promises for them.

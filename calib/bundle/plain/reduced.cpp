@@ -2,6 +2,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "calib/bundle/plain/iterative.h"
+
 namespace dtr::calib::plain {
 namespace {
 
@@ -23,9 +25,18 @@ void ForEachEntry(const Layout& layout, const std::vector<double>& blocks, const
 
 }  // namespace
 
-std::optional<Eigen::VectorXd> ReducedSolver::Solve(const std::vector<double>& blocks,
-                                                    const Eigen::VectorXd& right) {
-  auto step = layout_.sparse() ? SolveSparse(blocks, right) : SolveDense(blocks, right);
+std::optional<Eigen::VectorXd> ReducedSolver::Solve(const NormalEquations& normal, int threads) {
+  std::optional<Eigen::VectorXd> step;
+  switch (layout_.solution()) {
+    case Solution::kDense:
+      step = SolveDense(normal.blocks(), normal.right());
+      break;
+    case Solution::kSparse:
+      step = SolveSparse(normal.blocks(), normal.right());
+      break;
+    case Solution::kIterative:
+      step = SolveIteratively(problem_, layout_, normal, threads);
+  }
   if (step && !step->allFinite()) return {};
   return step;
 }

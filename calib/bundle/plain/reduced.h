@@ -6,16 +6,18 @@
 #include <vector>
 
 #include "calib/bundle/plain/layout.h"
+#include "calib/bundle/plain/normal.h"
 
 namespace dtr::calib::plain {
 
-/// Cholesky's factorisation of the blocks' matrix, dense or sparse as the layout says.
+/// Solves the reduced system as the layout says. An iterative solution (Agarwal et al. 2010, sec.
+/// 4) is one of an inexact Newton method; its preconditioner is every node's own block.
 class ReducedSolver {
  public:
-  explicit ReducedSolver(const Layout& layout) : layout_(layout) {}
+  ReducedSolver(const Problem& problem, const Layout& layout)
+      : problem_(problem), layout_(layout) {}
   /// Empty where the matrix is not positive definite.
-  std::optional<Eigen::VectorXd> Solve(const std::vector<double>& blocks,
-                                       const Eigen::VectorXd& right);
+  std::optional<Eigen::VectorXd> Solve(const NormalEquations& normal, int threads);
 
  private:
   std::optional<Eigen::VectorXd> SolveDense(const std::vector<double>& blocks,
@@ -23,6 +25,7 @@ class ReducedSolver {
   std::optional<Eigen::VectorXd> SolveSparse(const std::vector<double>& blocks,
                                              const Eigen::VectorXd& right);
 
+  const Problem& problem_;
   const Layout& layout_;
   Eigen::MatrixXd dense_;
   bool analysed_ = false;

@@ -25,7 +25,7 @@ constexpr int kFirstTracksPerImage = 250;  // the adjustments that settle camera
 constexpr int kMinPointsOfImage = 12;      // else it is resected
 constexpr int kMinResected = 20;
 constexpr int kLongTracksEnough = 150;  // images with fewer use tracks of two features, too
-constexpr int kImagesForLens = 3;
+constexpr int kImagesForLens = 2;
 constexpr double kRadius = 10;  // of the cameras, in units of the world
 constexpr int kSteps = 8;       // that Step is called for
 

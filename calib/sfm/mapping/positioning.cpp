@@ -1,11 +1,11 @@
 #include "calib/sfm/mapping/positioning.h"
 
 #include <Eigen/Dense>
-#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "calib/solve/conjugate_gradients.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/base/random.h"
 
@@ -100,208 +100,138 @@ double CostOf(const Problem& problem, const State& state) {
   return cost;
 }
 
-// Blocks of cameras that share a point: where they are, and which of them a point adds to. Made
-// once for all starts and all steps.
-class Pattern {
- public:
-  explicit Pattern(const Problem& problem) : cameras_(problem.cameras) {
-    for (size_t p = 0; p + 1 < problem.first.size(); ++p) {
-      ForEachPair(problem, p, [&](int row, int column) { keys_.push_back(Key(row, column)); });
-      if (keys_.size() > kKeysAtOnce) SortUnique();
-    }
-    for (int c = 0; c < cameras_; ++c) keys_.push_back(Key(c, c));
-    SortUnique();
-    for (size_t p = 0; p + 1 < problem.first.size(); ++p) {
-      ForEachPair(problem, p, [&](int row, int column) { slots_.push_back(SlotOf(row, column)); });
-    }
-    for (int c = 0; c < cameras_; ++c) diagonal_.push_back(SlotOf(c, c));
-    MakeMatrix();
-  }
-
-  /// Calls body(row, column) for the cameras of each two observations of a point, lower triangle.
-  template <typename Body>
-  static void ForEachPair(const Problem& problem, size_t point, const Body& body) {
-    for (size_t i = problem.first[point]; i < problem.first[point + 1]; ++i) {
-      for (size_t k = problem.first[point]; k < problem.first[point + 1]; ++k) {
-        const int row = problem.seen[i].camera, column = problem.seen[k].camera;
-        if (row >= column) body(row, column);
-      }
-    }
-  }
-
-  size_t blocks() const { return keys_.size(); }
-  /// Of the pairs of all points, in the order of ForEachPair.
-  const std::vector<std::uint32_t>& slots() const { return slots_; }
-  std::uint32_t diagonal(int camera) const { return diagonal_[camera]; }
-
-  /// The lower triangle of the matrix with these blocks.
-  void Fill(const std::vector<Matrix3d>& blocks, Eigen::SparseMatrix<double>* matrix) const {
-    *matrix = zeros_;
-    double* value = matrix->valuePtr();
-    ForEachEntry([&](size_t block, int i, int k) { *value++ = blocks[block](i, k); });
-  }
-
- private:
-  static constexpr size_t kKeysAtOnce = 4000000;
-
-  static std::uint64_t Key(int row, int column) {
-    return static_cast<std::uint64_t>(column) << 32 | static_cast<std::uint32_t>(row);
-  }
-  static int Row(std::uint64_t key) { return static_cast<int>(key & 0xffffffffu); }
-  static int Column(std::uint64_t key) { return static_cast<int>(key >> 32); }
-  void SortUnique() {
-    std::sort(keys_.begin(), keys_.end());
-    keys_.erase(std::unique(keys_.begin(), keys_.end()), keys_.end());
-  }
-  std::uint32_t SlotOf(int row, int column) const {
-    const auto at = std::lower_bound(keys_.begin(), keys_.end(), Key(row, column));
-    return static_cast<std::uint32_t>(at - keys_.begin());
-  }
-
-  // Calls body(block, row in it, column in it) for all entries of the lower triangle, column by
-  // column, as a compressed matrix stores them.
-  template <typename Body>
-  void ForEachEntry(const Body& body) const {
-    for (size_t begin = 0, end = 0; begin < keys_.size(); begin = end) {
-      while (end < keys_.size() && Column(keys_[end]) == Column(keys_[begin])) ++end;
-      for (int k = 0; k < 3; ++k) {
-        for (size_t block = begin; block < end; ++block) {
-          const bool on_diagonal = Row(keys_[block]) == Column(keys_[block]);
-          for (int i = on_diagonal ? k : 0; i < 3; ++i) body(block, i, k);
-        }
-      }
-    }
-  }
-
-  void MakeMatrix() {
-    std::vector<Eigen::Triplet<double>> entries;
-    ForEachEntry([&](size_t block, int i, int k) {
-      entries.emplace_back(3 * Row(keys_[block]) + i, 3 * Column(keys_[block]) + k, 0.0);
-    });
-    zeros_.resize(3 * cameras_, 3 * cameras_);
-    zeros_.setFromTriplets(entries.begin(), entries.end());
-  }
-
-  int cameras_;
-  std::vector<std::uint64_t> keys_;
-  std::vector<std::uint32_t> slots_, diagonal_;
-  Eigen::SparseMatrix<double> zeros_;
-};
-
+// The centres' equations without factors and points, which are never written out: their product
+// with a vector needs one pass over the observations.
 class Solver {
  public:
-  Solver(const Problem& problem, const Pattern& pattern)
-      : problem_(problem), pattern_(pattern), blocks_(pattern.blocks()) {}
+  explicit Solver(const Problem& problem) : problem_(problem), inner_(problem.cameras) {}
 
-  // Reduced equations at `state`, solved; false where they cannot be.
+  // Solves the equations at `state`; false where they cannot be.
   bool Step(const State& state, double lambda, State* next) {
     Build(state, lambda);
-    pattern_.Fill(blocks_, &matrix_);
-    if (!analysed_) solver_.analyzePattern(matrix_);
-    analysed_ = true;
-    solver_.factorize(matrix_);
-    if (solver_.info() != Eigen::Success) return false;
-    const Eigen::VectorXd step = solver_.solve(right_);
-    if (!step.allFinite()) return false;
-    Apply(state, step, next);
+    const auto step = calib::ConjugateGradients(
+        right_, kLinear, [&](const Eigen::VectorXd& x) { return Product(x); },
+        [&](const Eigen::VectorXd& x) { return Times(inner_, x); });
+    if (!step || !step->allFinite()) return false;
+    Apply(state, *step, next);
     return true;
   }
 
  private:
+  static constexpr calib::ConjugateGradientsOptions kLinear{.gain = 0.01, .max_iterations = 1000};
+
   // An observation with its factor eliminated. With u = X - c, residual r = v - d u has the
-  // derivatives -u by d, -d by X and d by c. Elimination of d leaves the matrix w d^2 P with
-  // P = 1 - u u^T / ((1 + lambda) u^2), and the gradient by X  -w d P r.
+  // derivatives -u by d, -d by X and d by c. Elimination of d leaves the matrix h = w d^2 P with
+  // P = 1 - u u^T / ((1 + lambda) u^2), and the gradient by X  g = -w d P r; by c the opposite.
   struct Part {
-    Matrix3d h;
-    Vector3d g;     // by X; by c the opposite
-    double u2 = 0;  // damped
+    Vector3d u, g;
+    double weight = 0, inverse_u2 = 0;  // w d^2; damped
+    Vector3d Times(const Vector3d& x) const { return weight * (x - inverse_u2 * u.dot(x) * u); }
+    Matrix3d H() const {
+      return weight * (Matrix3d::Identity() - inverse_u2 * (u * u.transpose()));
+    }
   };
   Part PartOf(const State& state, size_t point, size_t i, double lambda) const {
     const Vector3d u = state.points[point] - state.centres[problem_.seen[i].camera];
     const double d = state.factors[i];
     const Vector3d r = problem_.seen[i].ray - d * u;
     const double w = WeightOf(r.squaredNorm());
-    const double u2 = (1 + lambda) * u.squaredNorm() + 1e-12;
-    const Matrix3d p = Matrix3d::Identity() - u * u.transpose() / u2;
-    return {w * d * d * p, -w * d * (p * r), u2};
+    const double inverse_u2 = 1 / ((1 + lambda) * u.squaredNorm() + 1e-12);
+    return {u, -w * d * (r - inverse_u2 * u.dot(r) * u), w * d * d, inverse_u2};
   }
 
   void Build(const State& state, double lambda) {
-    for (Matrix3d& block : blocks_) block.setZero();
+    blocks_.assign(problem_.cameras, Matrix3d::Zero());
+    std::fill(inner_.begin(), inner_.end(), Matrix3d::Zero());
     right_ = Eigen::VectorXd::Zero(3 * problem_.cameras);
     inverse_.resize(state.points.size());
     gradient_.resize(state.points.size());
     parts_.resize(problem_.seen.size());
-    Eigen::VectorXd diagonal = Eigen::VectorXd::Zero(3 * problem_.cameras);
-    const std::uint32_t* slot = pattern_.slots().data();
     for (size_t p = 0; p < state.points.size(); ++p) {
       Matrix3d h = Matrix3d::Zero();
       Vector3d g = Vector3d::Zero();
       const size_t first = problem_.first[p], end = problem_.first[p + 1];
       for (size_t i = first; i < end; ++i) {
         parts_[i] = PartOf(state, p, i, lambda);
-        h += parts_[i].h;
+        h += parts_[i].H();
         g += parts_[i].g;
-        const int c = problem_.seen[i].camera;
-        blocks_[pattern_.diagonal(c)] += parts_[i].h;
-        diagonal.segment<3>(3 * c) += parts_[i].h.diagonal();
-        right_.segment<3>(3 * c) += parts_[i].g;  // minus the gradient by c
       }
       h.diagonal() *= 1 + lambda;
       h.diagonal().array() += 1e-12;
       inverse_[p] = h.inverse();
       gradient_[p] = g;
-      // The cross block of point and camera is -h_i.
+      const Vector3d shift = inverse_[p] * g;
       for (size_t i = first; i < end; ++i) {
-        const Matrix3d hi = parts_[i].h * inverse_[p];
-        const int ci = problem_.seen[i].camera;
-        right_.segment<3>(3 * ci) -= hi * g;
-        for (size_t k = first; k < end; ++k) {
-          const int ck = problem_.seen[k].camera;
-          if (ci >= ck) blocks_[*slot++].noalias() -= hi * parts_[k].h;
-        }
+        const int c = problem_.seen[i].camera;
+        const Matrix3d hi = parts_[i].H();
+        blocks_[c] += hi;
+        inner_[c] -= hi * inverse_[p] * hi;
+        // The cross block of point and camera is -h_i.
+        right_.segment<3>(3 * c) += parts_[i].g - parts_[i].Times(shift);
       }
     }
     for (int c = 0; c < problem_.cameras; ++c) {
-      Matrix3d& block = blocks_[pattern_.diagonal(c)];
-      block.diagonal() += lambda * diagonal.segment<3>(3 * c);
-      block.diagonal().array() += 1e-10;  // the gauge: world's origin and unit
+      blocks_[c].diagonal() *= 1 + lambda;
+      blocks_[c].diagonal().array() += 1e-10;  // the gauge: world's origin and unit
+      inner_[c] = (blocks_[c] + inner_[c]).inverse().eval();
     }
+  }
+
+  static Eigen::VectorXd Times(const std::vector<Matrix3d>& blocks, const Eigen::VectorXd& x) {
+    Eigen::VectorXd y(x.size());
+    for (size_t c = 0; c < blocks.size(); ++c) {
+      const auto at = static_cast<Eigen::Index>(3 * c);
+      y.segment<3>(at) = blocks[c] * x.segment<3>(at);
+    }
+    return y;
+  }
+
+  Eigen::VectorXd Product(const Eigen::VectorXd& x) const {
+    Eigen::VectorXd y = Times(blocks_, x);
+    for (size_t p = 0; p < inverse_.size(); ++p) {
+      const Vector3d moved = inverse_[p] * PullOf(p, x);
+      for (size_t i = problem_.first[p]; i < problem_.first[p + 1]; ++i) {
+        y.segment<3>(3 * problem_.seen[i].camera) -= parts_[i].Times(moved);
+      }
+    }
+    return y;
+  }
+
+  // What a step of the cameras adds to the right side of a point's equations.
+  Vector3d PullOf(size_t point, const Eigen::VectorXd& step) const {
+    Vector3d sum = Vector3d::Zero();
+    for (size_t i = problem_.first[point]; i < problem_.first[point + 1]; ++i) {
+      sum += parts_[i].Times(step.segment<3>(3 * problem_.seen[i].camera));
+    }
+    return sum;
   }
 
   void Apply(const State& state, const Eigen::VectorXd& step, State* next) const {
     *next = state;
     for (int c = 0; c < problem_.cameras; ++c) next->centres[c] += step.segment<3>(3 * c);
     for (size_t p = 0; p < state.points.size(); ++p) {
-      Vector3d right = -gradient_[p];
-      for (size_t i = problem_.first[p]; i < problem_.first[p + 1]; ++i) {
-        right += parts_[i].h * step.segment<3>(3 * problem_.seen[i].camera);
-      }
-      const Vector3d dx = inverse_[p] * right;
+      const Vector3d dx = inverse_[p] * (PullOf(p, step) - gradient_[p]);
       next->points[p] += dx;
       for (size_t i = problem_.first[p]; i < problem_.first[p + 1]; ++i) {
-        const Vector3d u = state.points[p] - state.centres[problem_.seen[i].camera];
+        const Vector3d& u = parts_[i].u;
         const Vector3d du = dx - step.segment<3>(3 * problem_.seen[i].camera);
         const Vector3d r = problem_.seen[i].ray - state.factors[i] * (u + du);
-        next->factors[i] = std::max(kMinFactor, state.factors[i] + u.dot(r) / parts_[i].u2);
+        next->factors[i] = std::max(kMinFactor, state.factors[i] + u.dot(r) * parts_[i].inverse_u2);
       }
     }
   }
 
   const Problem& problem_;
-  const Pattern& pattern_;
-  std::vector<Matrix3d> blocks_, inverse_;
+  std::vector<Matrix3d> blocks_;   // of the cameras, before the points' elimination
+  std::vector<Matrix3d> inner_;    // inverse of a camera's own block after it: the preconditioner
+  std::vector<Matrix3d> inverse_;  // of the points' blocks
   std::vector<Vector3d> gradient_;
   std::vector<Part> parts_;
   Eigen::VectorXd right_;
-  Eigen::SparseMatrix<double> matrix_;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver_;
-  bool analysed_ = false;
 };
 
-double Minimise(const Problem& problem, const Pattern& pattern, State* state,
-                const Progress* progress) {
-  Solver solver(problem, pattern);
+double Minimise(const Problem& problem, State* state, const Progress* progress) {
+  Solver solver(problem);
   double cost = CostOf(problem, *state), lambda = 1e-2;
   State next;
   int small = 0;
@@ -348,12 +278,11 @@ Positions PlaceCameras(std::span<const Matrix3d> cam_from_world, const Rays& ray
   const auto images = static_cast<int>(cam_from_world.size());
   const Problem problem = MakeProblem(cam_from_world, rays, node_of, tracks,
                                       CoveringTracks(images, tracks, kTracksPerImage));
-  const Pattern pattern(problem);
   std::vector<State> states(kStarts);
   std::vector<double> costs(kStarts);
   ParallelFor(0, kStarts, threads, [&](int s) {
     states[s] = RandomStart(problem, HashOf(seed, static_cast<std::uint64_t>(s)));
-    costs[s] = Minimise(problem, pattern, &states[s], progress);
+    costs[s] = Minimise(problem, &states[s], progress);
   });
   const auto best = std::min_element(costs.begin(), costs.end()) - costs.begin();
   Positions positions{std::vector<Vector3d>(images, Vector3d::Zero()), costs[best]};

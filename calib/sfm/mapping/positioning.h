@@ -22,8 +22,8 @@ struct Positions {
 /// centres c, points X and a factor d > 0 of each observation it minimises Huber's loss of
 /// |v - d (X - c)|, v the ray in the world. Images of one `node_of` have one centre. Random starts
 /// from `seed`, of which the best end counts. Levenberg-Marquardt by hand: factors, then points are
-/// eliminated; the centres' equations are solved by a sparse Cholesky decomposition. `tracks`: of
-/// these a part that covers all images is used.
+/// eliminated; the centres' equations are solved by conjugate gradients. `tracks`: of these a part
+/// that covers all images is used.
 Positions PlaceCameras(std::span<const Eigen::Matrix3d> cam_from_world, const Rays& rays,
                        std::span<const int> node_of, std::span<const Track> tracks,
                        std::uint64_t seed, int threads, const Progress* progress);

@@ -166,7 +166,43 @@ TEST(PlainAdjust, LongWalkIsSolvedSparsely) {
   settings.free_params = {{0, 3, 4}};
   const plain::Problem problem(start, n, std::vector<bool>(start.observations.size(), true),
                                settings);
-  EXPECT_TRUE(plain::Layout(problem).sparse());
+  EXPECT_EQ(plain::Layout(problem).solution(), plain::Solution::kSparse);
+}
+
+// Photos of one object of which any two may see a common point, so that no order of elimination
+// leaves few blocks.
+Bundle ManyOfOneObject(int images) {
+  constexpr double kObservationsPerPoint = 12;
+  Bundle bundle = MakeBundle({.images = images, .points = 3 * images});
+  Random random(11);
+  std::erase_if(bundle.observations, [&](const BundleObservation&) {
+    return random.Uniform() > kObservationsPerPoint / images;
+  });
+  return bundle;
+}
+
+TEST(PlainAdjust, ManyPhotosOfOneObjectAreSolvedIteratively) {
+  const Bundle truth = ManyOfOneObject(560);
+  const Bundle start = Perturbed(truth, 1e-3);
+  Normalised n = Normalised::Around(start);
+  plain::Settings settings;
+  settings.free_params = {{0, 3, 4}};
+  const plain::Problem problem(start, n, std::vector<bool>(start.observations.size(), true),
+                               settings);
+  const plain::Layout layout(problem);
+  ASSERT_EQ(layout.solution(), plain::Solution::kIterative);
+  EXPECT_LT(layout.storage(), 100 * layout.nodes()) << "no block of two images";
+
+  Bundle found = start;
+  EXPECT_TRUE(AdjustPlain({}, {}, found).converged);
+  EXPECT_LT(LargestDifference(Projections(found), Projections(truth)), kSamePx);
+  Bundle by_one = start, by_two = start;
+  PlainOptions options;
+  options.max_iterations = 2;
+  AdjustPlain(options, {}, by_one);
+  options.threads = 2;
+  AdjustPlain(options, {}, by_two);
+  EXPECT_EQ(LargestDifference(Projections(by_one), Projections(by_two)), 0);
 }
 
 TEST(PlainAdjust, SeparateLensesAndShiftsAreSolved) {

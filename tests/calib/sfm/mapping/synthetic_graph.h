@@ -35,6 +35,7 @@ struct GraphSpec {
   double outlier_share = 0.03;  ///< of matches
   PairKind kind = PairKind::kCalibrated;
   int min_matches = 15;
+  double min_facing = 0.25;  ///< cosine of a surface's normal and the direction it is seen from
 };
 
 inline calib::LensCamera Lens(double focal_px = 700, double k1 = 0) {
@@ -70,7 +71,7 @@ inline Seen Photograph(const Scene& scene, const GraphSpec& spec, Random* random
     for (size_t p = 0; p < scene.points.size(); ++p) {
       const ScenePoint& point = scene.points[p];
       const Eigen::Vector3d towards = (centre - point.p).normalized();
-      if (!point.normal.isZero() && point.normal.dot(towards) < 0.25) continue;
+      if (!point.normal.isZero() && point.normal.dot(towards) < spec.min_facing) continue;
       const auto pixel = lens.PixelFromCam(scene.cam_from_world[i] * point.p);
       if (!pixel || pixel->x() < 0 || pixel->y() < 0 || pixel->x() > lens.width_px ||
           pixel->y() > lens.height_px) {
