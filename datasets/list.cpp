@@ -31,6 +31,7 @@ const char* SummaryOf(const std::string& scene) {
   if (scene == "plane") return "one painted plane, tilted by 25 degrees, filling the frame";
   if (scene == "stairs") return "eight steps between walls";
   if (scene == "sphere") return "a ball of radius 1.5 before a painted wall";
+  if (scene == "toys") return "a ball rolls, a crate slides, a box turns; all else stands still";
   if (scene == "plain-room") {
     return "the room with painted walls and ceiling, of which photos show next to nothing";
   }

@@ -5,8 +5,10 @@
 #include <utility>
 
 #include "datasets/layout.h"
+#include "datasets/make_dynamic.h"
 #include "datasets/render_truth.h"
 #include "datasets/scene.h"
+#include "datasets/write_truth.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/random.h"
@@ -28,7 +30,8 @@ constexpr int kMinSidePx = 16, kMaxSidePx = 16384;
 // less than this.
 constexpr double kMaxScale = 1e6;
 constexpr double kMaxOffset = 1e9;
-constexpr double kMaxSeconds = 1;  // then the ball leaves the images
+constexpr double kMaxSeconds = 1000, kMaxRollS = 1;  // then the ball of `sphere` leaves the images
+constexpr int kMaxSteps = 10000, kMaxStepsPerSecond = 1000;
 constexpr double kMaxDriftStops = 10;
 constexpr int kMinVisibleOthers = 2;  // as docs/ACCURACY.md counts pixels with true depth
 
@@ -37,26 +40,6 @@ void CheckRange(const char* field, double value, double low, double high) {
   char text[160];
   std::snprintf(text, sizeof text, "%s: expected %g to %g, found %g", field, low, high, value);
   throw UsageError(text);
-}
-
-void Check(const DatasetSpec& spec) {
-  CheckRange("views", spec.views, 2, kMaxViews);
-  CheckRange("width", spec.width_px, kMinSidePx, kMaxSidePx);
-  CheckRange("height", spec.height_px, kMinSidePx, kMaxSidePx);
-  CheckRange("focal length (35 mm)", spec.focal_35mm, 8, 400);
-  CheckRange("supersampling", spec.supersampling, 1, 16);
-  CheckRange("noise", spec.noise, 0, 255);
-  CheckRange("exposure drift", spec.exposure_drift, -kMaxDriftStops, kMaxDriftStops);
-  CheckRange("scale", spec.scale, 1 / kMaxScale, kMaxScale);
-  for (int k = 0; k < 3; ++k) {
-    CheckRange("world offset", spec.world_offset[k], -kMaxOffset, kMaxOffset);
-  }
-  CheckRange("time", spec.time_s, -kMaxSeconds, kMaxSeconds);
-  if (spec.panoramas && (spec.width_px % 2 != 0 || spec.k1 != 0 || spec.k2 != 0)) {
-    throw UsageError(
-        "panoramas: expected an even width and no lens distortion; the views have none");
-  }
-  CheckRange("JPEG quality", spec.jpeg_quality, 1, 100);
 }
 
 std::string NumberName(int i) {
@@ -94,13 +77,8 @@ void WriteView(const DatasetSpec& spec, const Scene& scene, const std::vector<Po
   const PinholeCamera camera = MakeCamera(spec.width_px, spec.height_px, spec.focal_35mm);
   const std::string name = NumberName(i);
 
-  PhotoOptions options;
-  options.supersampling = spec.supersampling;
-  options.noise_sigma = spec.noise;
-  options.gain = ExposureGain(spec.exposure_drift, i, spec.views);
-  options.lens = {spec.k1, spec.k2};
-  options.seed = HashOf(spec.seed, static_cast<std::uint64_t>(i));
-  options.threads = threads;
+  const PhotoOptions options =
+      PhotoOptionsOf(spec, i, HashOf(spec.seed, static_cast<std::uint64_t>(i)), threads);
   const Grid<float> light = RenderLight(scene, camera, pose, options);
   io::ExifFocal exif;
   exif.focal_mm = spec.focal_35mm;
@@ -110,20 +88,7 @@ void WriteView(const DatasetSpec& spec, const Scene& scene, const std::vector<Po
   io::WriteJpegWithExif(folder / "images" / (name + ".jpg"), Develop(light, options),
                         spec.jpeg_quality, exif);
 
-  io::WriteExr(folder / "depth" / (name + ".exr"),
-               RenderDepth(scene, camera, pose, threads, spec.scale).grid());
-
-  std::vector<Pose> others = poses;
-  others.erase(others.begin() + i);
-  io::WriteMask(folder / "masks" / (name + "_visible.png"),
-                VisibilityMask(scene, camera, pose, others, kMinVisibleOthers, threads));
-  // Noise is no texture, and truth lies on the ideal grid: the mask is made without either.
-  PhotoOptions ideal = options;
-  ideal.noise_sigma = 0;
-  ideal.lens = {};
-  const ImageRgb8 clean =
-      options.lens.IsIdeal() ? Develop(light, ideal) : RenderPhoto(scene, camera, pose, ideal);
-  io::WriteMask(folder / "masks" / (name + "_texture.png"), TextureMask(clean));
+  WriteViewTruth(spec, scene, poses, i, light, options, folder, name, threads);
 }
 
 /// One panorama's files: itself, and the views of a cube around it, exact.
@@ -163,6 +128,80 @@ void WritePanorama(const DatasetSpec& spec, const Scene& scene, const Pose& pose
 
 }  // namespace
 
+void CheckSpec(const DatasetSpec& spec) {
+  CheckRange("views", spec.views, 2, kMaxViews);
+  CheckRange("width", spec.width_px, kMinSidePx, kMaxSidePx);
+  CheckRange("height", spec.height_px, kMinSidePx, kMaxSidePx);
+  CheckRange("focal length (35 mm)", spec.focal_35mm, 8, 400);
+  CheckRange("supersampling", spec.supersampling, 1, 16);
+  CheckRange("noise", spec.noise, 0, 255);
+  CheckRange("exposure drift", spec.exposure_drift, -kMaxDriftStops, kMaxDriftStops);
+  CheckRange("scale", spec.scale, 1 / kMaxScale, kMaxScale);
+  for (int k = 0; k < 3; ++k) {
+    CheckRange("world offset", spec.world_offset[k], -kMaxOffset, kMaxOffset);
+  }
+  CheckRange("steps", spec.steps, 1, kMaxSteps);
+  CheckRange("steps per second", spec.steps_per_second, 1, kMaxStepsPerSecond);
+  const double limit_s = spec.scene == "sphere" ? kMaxRollS : kMaxSeconds;
+  const double length_s = static_cast<double>(spec.steps - 1) / spec.steps_per_second;
+  CheckRange("time", spec.time_s, -limit_s, limit_s);
+  CheckRange("time of the last step", spec.time_s + length_s, -limit_s, limit_s);
+  if (spec.panoramas && (spec.width_px % 2 != 0 || spec.k1 != 0 || spec.k2 != 0)) {
+    throw UsageError(
+        "panoramas: expected an even width and no lens distortion; the views have none");
+  }
+  CheckRange("JPEG quality", spec.jpeg_quality, 1, 100);
+  if (spec.steps == 1) return;
+  if (spec.panoramas || spec.k1 != 0 || spec.k2 != 0 || spec.exposure_drift != 0) {
+    throw UsageError(
+        "steps: expected pinhole cameras of one exposure for several time steps; leave out "
+        "`panoramas`, `k1`, `k2` and `exposure_drift`");
+  }
+}
+
+PhotoOptions PhotoOptionsOf(const DatasetSpec& spec, int i, std::uint64_t noise_seed, int threads) {
+  PhotoOptions options;
+  options.supersampling = spec.supersampling;
+  options.noise_sigma = spec.noise;
+  options.gain = ExposureGain(spec.exposure_drift, i, spec.views);
+  options.lens = {spec.k1, spec.k2};
+  options.seed = noise_seed;
+  options.threads = threads;
+  return options;
+}
+
+void WriteViewTruth(const DatasetSpec& spec, const Scene& scene, const std::vector<Pose>& poses,
+                    int i, const Grid<float>& light, const PhotoOptions& options,
+                    const fs::path& folder, const std::string& stem, int threads) {
+  const Pose& pose = poses[static_cast<size_t>(i)];
+  const PinholeCamera camera = MakeCamera(spec.width_px, spec.height_px, spec.focal_35mm);
+  io::WriteExr(folder / "depth" / (stem + ".exr"),
+               RenderDepth(scene, camera, pose, threads, spec.scale).grid());
+
+  std::vector<Pose> others = poses;
+  others.erase(others.begin() + i);
+  io::WriteMask(folder / "masks" / (stem + "_visible.png"),
+                VisibilityMask(scene, camera, pose, others, kMinVisibleOthers, threads));
+  // Noise is no texture, and truth lies on the ideal grid: the mask is made without either.
+  PhotoOptions ideal = options;
+  ideal.noise_sigma = 0;
+  ideal.lens = {};
+  const ImageRgb8 clean =
+      options.lens.IsIdeal() ? Develop(light, ideal) : RenderPhoto(scene, camera, pose, ideal);
+  io::WriteMask(folder / "masks" / (stem + "_texture.png"), TextureMask(clean));
+}
+
+DatasetSpec DefaultSpecOf(const std::string& scene) {
+  DatasetSpec spec;
+  spec.scene = scene;
+  if (scene != "toys") return spec;
+  spec.views = 8;
+  spec.width_px = 320;
+  spec.height_px = 216;
+  spec.steps = 30;
+  return spec;
+}
+
 double ExposureGain(double drift_stops, int i, int views) {
   return std::exp2(drift_stops * (static_cast<double>(i) / (views - 1) - 0.5));
 }
@@ -177,7 +216,11 @@ void MakeDataset(const DatasetSpec& given, const fs::path& given_folder, int thr
                  Progress& progress) {
   const fs::path out_folder = WithoutTrailingSlash(given_folder);
   DatasetSpec spec = given;
-  Check(spec);
+  CheckSpec(spec);
+  if (spec.steps > 1) {
+    MakeDynamicDataset(spec, out_folder, threads, progress);
+    return;
+  }
   if (fs::exists(out_folder)) {
     throw UsageError(out_folder.string() +
                      ": expected a folder that does not exist yet; remove "

@@ -32,9 +32,17 @@ struct DatasetSpec {
   /// views of a cube around each are rendered as pinhole cameras would, in images/ and depth/.
   /// height_px, focal_35mm and the lens play no part.
   bool panoramas = false;
-  double time_s = 0;  ///< the time step, where something moves (MakeScene)
+  double time_s = 0;  ///< the time step, where something moves (MakeScene); the first of several
+  /// Several: what the fixed cameras of a rig saw (make_dynamic.h), in another layout of files.
+  int steps = 1;
+  int steps_per_second = 10;
+  bool videos = false;  ///< of several time steps: a video per camera instead of photos
   int jpeg_quality = 95;
 };
+
+/// The spec of a scene before anything is asked for: the members' defaults, and of a scene made for
+/// several time steps, small photos of few cameras.
+DatasetSpec DefaultSpecOf(const std::string& scene);
 
 /// Linear exposure factor of photo `i` of `views`: 2^(drift * (i / (views - 1) - 1/2)).
 double ExposureGain(double drift_stops, int i, int views);
@@ -52,6 +60,7 @@ Pose WrittenPose(const Pose& cam_from_scene, double scale, const Eigen::Vector3d
 ///   dataset.json, SOURCE.md  how it was made
 /// With `panoramas`: panoramas/NNNN.jpg (XMP GPano), and of each view of the cube (FaceSizePx)
 /// images/FACE/NNNN.jpg, depth/FACE/NNNN.exr and a camera FACE/NNNN.jpg in cameras.json; no masks.
+/// With several time steps: as MakeDynamicDataset.
 /// The folder appears when all is done, under its name with ".partial" before.
 /// Throws UsageError when it exists or the spec is out of range (naming the field), Error when
 /// something cannot be written.

@@ -89,9 +89,10 @@ class Scene {
   std::vector<Node> nodes_;
 };
 
-/// The scenes by name: courtyard, plane, stairs, sphere, room, plain-room. `seed` changes textures and, in
-/// courtyard and the rooms, small things; never the framing. `time_s`: the time step; the ball of
-/// `sphere` rolls, all else stands still. Throws UsageError for other names, listing those that
+/// The scenes by name: courtyard, plane, stairs, sphere, room, plain-room, toys. `seed` changes
+/// textures and, in courtyard and the rooms, small things; never the framing. `time_s`: the time
+/// step; the ball of `sphere` rolls; of `toys` a ball rolls, a crate slides and a box turns; all
+/// else stands still. Throws UsageError for other names, listing those that
 /// exist, and for another time than 0 of a scene where nothing moves.
 Scene MakeScene(const std::string& name, std::uint64_t seed, double time_s = 0);
 

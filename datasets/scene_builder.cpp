@@ -127,21 +127,24 @@ Lighting Daylight() {
 }
 
 std::vector<std::string> SceneNames() {
-  return {"courtyard", "plane", "stairs", "sphere", "room", "plain-room"};
+  return {"courtyard", "plane", "stairs", "sphere", "room", "plain-room", "toys"};
 }
 
 Scene MakeScene(const std::string& name, std::uint64_t seed, double time_s) {
   if (name == "sphere") return MakeSphere(seed, time_s);
+  if (name == "toys") return MakeToys(seed, time_s);
   if (time_s != 0) {
-    throw UsageError("`time`: expected 0 for " + name + ", where nothing moves; sphere moves");
+    throw UsageError("`time`: expected 0 for " + name +
+                     ", where nothing moves; sphere and toys move");
   }
   if (name == "courtyard") return MakeCourtyard(seed);
   if (name == "plane") return MakePlane(seed);
   if (name == "stairs") return MakeStairs(seed);
   if (name == "room") return MakeRoom(seed, false);
   if (name == "plain-room") return MakeRoom(seed, true);
-  throw UsageError("scene: expected courtyard, plane, stairs, sphere, room or plain-room, found '" +
-                   name + "'; see `dtr dataset list`");
+  throw UsageError(
+      "scene: expected courtyard, plane, stairs, sphere, room, plain-room or toys, found '" + name +
+      "'; see `dtr dataset list`");
 }
 
 }  // namespace dtr::datasets

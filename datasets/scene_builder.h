@@ -53,5 +53,6 @@ Scene MakeRoom(std::uint64_t seed, bool plain);
 Scene MakePlane(std::uint64_t seed);
 Scene MakeStairs(std::uint64_t seed);
 Scene MakeSphere(std::uint64_t seed, double time_s = 0);
+Scene MakeToys(std::uint64_t seed, double time_s = 0);
 
 }  // namespace dtr::datasets

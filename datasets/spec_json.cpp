@@ -68,6 +68,11 @@ std::string FormatSpecJson(const DatasetSpec& spec) {
   json["jpeg_quality"] = spec.jpeg_quality;
   if (spec.panoramas) json["panoramas"] = true;
   if (spec.time_s != 0) json["time_s"] = spec.time_s;  // still scenes have no time
+  if (spec.steps > 1) {
+    json["steps"] = spec.steps;
+    json["steps_per_second"] = spec.steps_per_second;
+    json["videos"] = spec.videos;
+  }
   return json.dump(2) + "\n";
 }
 
@@ -110,6 +115,11 @@ DatasetSpec ParseSpecJson(const std::string& text, const std::string& source) {
     spec.panoramas = FieldOf<bool>(json, "panoramas", &Json::is_boolean, "true or false", source);
   }
   if (json.contains("time_s")) spec.time_s = NumberOf(json, "time_s", source);
+  if (json.contains("steps")) {
+    spec.steps = IntOf(json, "steps", source);
+    spec.steps_per_second = IntOf(json, "steps_per_second", source);
+    spec.videos = FieldOf<bool>(json, "videos", &Json::is_boolean, "true or false", source);
+  }
   return spec;
 }
 

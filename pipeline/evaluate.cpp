@@ -9,6 +9,7 @@
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/time_steps.h"
+#include "pipeline/detail/dynamic/evaluate_steps.h"
 #include "pipeline/evaluate_depth.h"
 
 namespace dtr::pipeline {
@@ -49,6 +50,12 @@ EvaluateResult Evaluate(const EvaluateRequest& request,
   if (fs::exists(request.images) && !fs::is_directory(request.images)) {
     throw UsageError(
         fmt::format("`images` {}: expected a folder, found a file", request.images.string()));
+  }
+  if (!request.leave_one_out) {
+    const DtrSet described = io::ReadSet(request.set);
+    if (described.frames.size() > 1) {
+      return EvaluateSteps(request, described, make_renderer, progress);
+    }
   }
   const DtrSet set = Load(request, progress);
   EvaluateResult result;

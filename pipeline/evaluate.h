@@ -6,6 +6,7 @@
 
 #include "dtr/base/progress.h"
 #include "dtr/eval/depth_truth.h"
+#include "dtr/eval/flicker.h"
 #include "dtr/eval/held_out.h"
 #include "dtr/render/options.h"
 
@@ -23,9 +24,13 @@ struct EvaluateRequest {
 
 struct EvaluateResult {
   eval::EvaluationReport views;
-  std::optional<eval::DepthScores> depth;  ///< where there is truth
+  std::optional<eval::DepthScores> depth;      ///< where there is truth
+  std::optional<eval::FlickerScores> flicker;  ///< of dynamic sets with truth
+  size_t time_steps = 1;  ///< several: figures of a view are means over them, of depth pooled
 };
 
+/// Dynamic sets: the same for every time step, one in memory; `truth` has a folder for each then,
+/// by the time step's number (as `dtr dataset make` writes truth/), and `images` one too.
 /// Renders every held-out view and compares it with its photo. `make_renderer` is called once, if
 /// there is anything to render. Throws UsageError where there is nothing to measure, Error for a
 /// broken set or truth.

@@ -95,13 +95,13 @@ ViewTruth StoredTruth(const fs::path& folder, const io::NamedCamera& named, cons
 
 }  // namespace
 
-eval::DepthScores EvaluateDepth(const DtrSet& set, const fs::path& truth, int threads,
-                                Progress& progress) {
+void ScoreDepth(const DtrSet& set, const fs::path& truth, int threads, Progress& progress,
+                DepthScorers* scorers,
+                const std::function<void(const View&, const ScoredDepth&)>& on_view) {
   const io::CameraList list = io::ReadCamerasJson(truth / "cameras.json");
   const std::vector<Pair> pairs = PairByName(set, list, truth);
   const double scale = ScaleFromTruth(set, list, pairs, progress);
   const auto cast = CastTruth::FromFolder(truth, list);
-  eval::DepthScorer scorer, of_completed;
   progress.Stage("scoring depth", static_cast<int>(pairs.size()));
   int done = 0;
   for (const Pair& pair : pairs) {
@@ -117,20 +117,32 @@ eval::DepthScores EvaluateDepth(const DtrSet& set, const fs::path& truth, int th
             ? cast->On(view, static_cast<size_t>(pair.truth - list.cameras.data()), threads)
             : StoredTruth(truth, *pair.truth, view);
     const DepthImage truth_there = eval::SubsampleTruth(found.depth, view.depth_scale);
+    const Mask scored = eval::SubsampleMask(found.scored, view.depth_scale);
     if (!view.depth_state.empty())
-      of_completed.Add(CompletedDepth(view), truth_there, {}, scale, 0);
-    scorer.Add(depth, truth_there, eval::SubsampleMask(found.scored, view.depth_scale), scale,
-               camera.fx_px() * view.reference_baseline,
-               view.inverse_depth_sigma ? &*view.inverse_depth_sigma : nullptr);
+      scorers->completed.Add(CompletedDepth(view), truth_there, {}, scale, 0);
+    scorers->measured.Add(depth, truth_there, scored, scale,
+                          camera.fx_px() * view.reference_baseline,
+                          view.inverse_depth_sigma ? &*view.inverse_depth_sigma : nullptr);
+    if (on_view) on_view(view, {depth, truth_there, scored});
     progress.Update(++done);
   }
-  eval::DepthScores scores = scorer.Scores();
-  const eval::DepthScores completed = of_completed.Scores();
+}
+
+eval::DepthScores ScoresOf(const DepthScorers& scorers) {
+  eval::DepthScores scores = scorers.measured.Scores();
+  const eval::DepthScores completed = scorers.completed.Scores();
   scores.completed_pixels = completed.kept_pixels;
   if (completed.outlier_share_5pct) {
     scores.completed_share_within_5pct = 1 - *completed.outlier_share_5pct;
   }
   return scores;
+}
+
+eval::DepthScores EvaluateDepth(const DtrSet& set, const fs::path& truth, int threads,
+                                Progress& progress) {
+  DepthScorers scorers;
+  ScoreDepth(set, truth, threads, progress, &scorers, {});
+  return ScoresOf(scorers);
 }
 
 }  // namespace dtr::pipeline

@@ -1,6 +1,7 @@
 // pipeline/evaluate_depth.h -- a set's depth maps against true ones.
 #pragma once
 #include <filesystem>
+#include <functional>
 
 #include "dtr/base/progress.h"
 #include "dtr/eval/depth_truth.h"
@@ -17,5 +18,23 @@ namespace dtr::pipeline {
 /// Throws Error when a grid differs, the cameras cannot be aligned or a file is missing or broken.
 eval::DepthScores EvaluateDepth(const DtrSet& set, const std::filesystem::path& truth, int threads,
                                 Progress& progress);
+
+/// The scorers of EvaluateDepth, that more than one set may be added to.
+struct DepthScorers {
+  eval::DepthScorer measured, completed;
+};
+
+/// Depth of a view as it is scored; borrowed.
+struct ScoredDepth {
+  const DepthImage& measured;
+  const DepthImage& truth;
+  const Mask& scored;
+};
+
+/// As EvaluateDepth, adding to `scorers`; hands out every view that is scored (null: to nobody).
+void ScoreDepth(const DtrSet& set, const std::filesystem::path& truth, int threads,
+                Progress& progress, DepthScorers* scorers,
+                const std::function<void(const View&, const ScoredDepth&)>& on_view);
+eval::DepthScores ScoresOf(const DepthScorers& scorers);
 
 }  // namespace dtr::pipeline

@@ -80,7 +80,8 @@ class Instrument {
 
 DepthEstimate FilterByConsistency(const StereoView& view, const DepthEstimate& estimate,
                                   std::span<const OtherDepth> others,
-                                  const ConsistencyOptions& options, int threads) {
+                                  const ConsistencyOptions& options, int threads,
+                                  const Mask* wanted) {
   if (options.min_agreeing <= 0) return estimate;
   std::vector<Checker> checkers;
   for (const OtherDepth& other : others) {
@@ -97,6 +98,7 @@ DepthEstimate FilterByConsistency(const StereoView& view, const DepthEstimate& e
     for (int x = 0; x < estimate.depth.width(); ++x) {
       const float z = estimate.depth(x, y);
       if (DepthImage::IsHole(z)) continue;
+      if (wanted != nullptr && (*wanted)(x, y) == 0) continue;
       const Eigen::Vector3d p = view.camera.CamFromPixel({x + 0.5, y + 0.5}, z, DepthKind::kPlaneZ);
       const Eigen::Vector2d share((x + 0.5) / estimate.depth.width(),
                                   (y + 0.5) / estimate.depth.height());

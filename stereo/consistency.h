@@ -25,9 +25,11 @@ struct OtherDepth {
 /// A prior of the view confirms what lies within 2.5 standard deviations of it, off its edges.
 /// The sigma of a pixel that is kept although c maps confirm and r > 0 refute it grows by
 /// exp(5 r / (c + r + 1)): it is more likely to be wrong.
+/// Pixels that are 0 in `wanted` (null: none) stay as they are.
 /// Only the unfiltered inputs are read, so the order in which views are filtered has no influence.
 DepthEstimate FilterByConsistency(const StereoView& view, const DepthEstimate& estimate,
                                   std::span<const OtherDepth> others,
-                                  const ConsistencyOptions& options, int threads);
+                                  const ConsistencyOptions& options, int threads,
+                                  const Mask* wanted = nullptr);
 
 }  // namespace dtr::stereo

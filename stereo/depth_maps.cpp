@@ -7,8 +7,8 @@
 
 #include "dtr/base/parallel_for.h"
 #include "stereo/left_out.h"
-#include "stereo/prior_use.h"
 #include "stereo/rounds.h"
+#include "stereo/time_step.h"
 #include "stereo/widen.h"
 
 namespace dtr::stereo {
@@ -194,10 +194,11 @@ class Run {
     }
     // What makes room here also leaves it for writing the result.
     const StereoView& of = views_[static_cast<size_t>(view)];
-    const Pages::Reservation result(pages_, kResultCopies * EstimateBytes(of.camera) +
-                                                (of.prior != nullptr ? PriorBytes(of.camera) : 0));
-    return FilterByConsistency(views_[static_cast<size_t>(view)], *own, others,
-                               options_.consistency, options_.engine.threads);
+    const Pages::Reservation result(pages_,
+                                    kResultCopies * EstimateBytes(of.camera) + OtherBytes(of));
+    const auto time_step = of.time_step != nullptr ? of.time_step->load() : nullptr;
+    return FilterByConsistency(of, *own, others, options_.consistency, options_.engine.threads,
+                               time_step ? &time_step->open : nullptr);
   }
 
   /// Drops raw maps nobody waits for any more.

@@ -16,6 +16,8 @@
 
 namespace dtr::stereo {
 
+struct TimeStepSource;  // stereo/time_step.h
+
 /// A calibrated, undistorted photo. Borrowed: the pixels must outlive the call.
 struct StereoView {
   PinholeCamera camera{1, 1, 1, 1, 0, 0};
@@ -23,6 +25,8 @@ struct StereoView {
   const ImageRgb8* image = nullptr;   ///< 8-bit sRGB, size of `camera`
   const Mask* mask = nullptr;         ///< null or empty: every pixel is usable
   const DepthPrior* prior = nullptr;  ///< null: nothing is known of its depth
+  /// What other time steps say of it, for engines with rounds; null: it is worked out alone.
+  const TimeStepSource* time_step = nullptr;
 };
 
 /// Depths to search in the reference view, plane z in scene units, 0 < near_z < far_z.

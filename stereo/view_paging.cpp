@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "stereo/prior_use.h"
+#include "stereo/time_step.h"
 
 namespace dtr::stereo {
 namespace {
@@ -18,6 +19,11 @@ std::uint64_t PixelsOf(const PinholeCamera& camera) {
 std::uint64_t PixelBytes(const PinholeCamera& camera) { return 4 * PixelsOf(camera); }
 std::uint64_t PlaneBytes(const PinholeCamera& camera) { return 12 * PixelsOf(camera); }
 std::uint64_t EstimateBytes(const PinholeCamera& camera) { return 8 * PixelsOf(camera); }
+
+std::uint64_t OtherBytes(const StereoView& view) {
+  return (view.prior != nullptr ? PriorBytes(view.camera) : 0) +
+         (view.time_step != nullptr ? TimeStepBytes(view.camera) : 0);
+}
 
 std::shared_ptr<const PlaneMap> PagedPlanes::Load(int round, int view) {
   return pages_.Get<PlaneMap>({PageKey::Kind::kPlanes, round, view},
@@ -80,10 +86,9 @@ std::uint64_t LeastBytes(std::span<const StereoView> views, const Engine& engine
   constexpr std::uint64_t kMore = Pages::kLoadingCopies - 1;
   const std::uint64_t loading = pixels + planes + kMore * largest_page;
   const std::uint64_t working = pixels + planes + engine.WorkBytes(views, view, neighbours);
-  const std::uint64_t prior =
-      filters && views[static_cast<size_t>(view)].prior != nullptr ? PriorBytes(camera) : 0;
+  const std::uint64_t other = filters ? OtherBytes(views[static_cast<size_t>(view)]) : 0;
   const std::uint64_t filtering =
-      estimates + std::max(kMore * largest_page, kResultCopies * EstimateBytes(camera)) + prior;
+      estimates + std::max(kMore * largest_page, kResultCopies * EstimateBytes(camera)) + other;
   return std::max({loading, working, filtering});
 }
 

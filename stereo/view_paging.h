@@ -100,6 +100,9 @@ std::uint64_t PixelBytes(const PinholeCamera& camera);
 std::uint64_t PlaneBytes(const PinholeCamera& camera);
 std::uint64_t EstimateBytes(const PinholeCamera& camera);
 
+/// What filtering a view takes of what is known of it otherwise: its prior, its time step.
+std::uint64_t OtherBytes(const StereoView& view);
+
 /// The least room in which an engine can work on a view: the largest of its steps, with everything
 /// that the step needs at the same time.
 std::uint64_t LeastBytes(std::span<const StereoView> views, const Engine& engine, int view,

@@ -10,13 +10,54 @@
 #include "cli/sfm_options.h"
 #include "cli/video_options.h"
 #include "pipeline/build.h"
+#include "pipeline/build_dynamic.h"
 #include "pipeline/import.h"
 
 namespace dtr::cli {
 namespace {
 
+struct BuildArguments {
+  pipeline::BuildOptions options;
+  bool is_dynamic = false;
+  std::string temporal = "on";
+  pipeline::DynamicOptions dynamic;
+};
+
+// What concerns sets of several time steps alone.
+void AddDynamicOptions(CLI::App& command, BuildArguments& arguments) {
+  CLI::Option* dynamic =
+      command.add_flag("--dynamic", arguments.is_dynamic,
+                       "A dynamic set: a video or folder of photos of each of several fixed "
+                       "cameras, whose frames of "
+                       "equal number (or sync_index of timestamps.csv) are time steps");
+  command
+      .add_option("--from", arguments.dynamic.from, "With --dynamic: first time step, from 0 [0]")
+      ->check(CLI::NonNegativeNumber)
+      ->needs(dynamic)
+      ->type_name("N");
+  command.add_option("--to", arguments.dynamic.to, "With --dynamic: last time step [all]")
+      ->check(CLI::NonNegativeNumber)
+      ->needs(dynamic)
+      ->type_name("N");
+  command
+      .add_option("--fps", arguments.dynamic.fps,
+                  "With --dynamic: time steps per second [as the videos; photos 24]")
+      ->needs(dynamic)
+      ->type_name("N");
+  command
+      .add_option("--temporal", arguments.temporal,
+                  "With --dynamic: on: depth begins with that of the time step before, and what "
+                  "stands still keeps one depth; off: every time step alone [on]")
+      ->check(CLI::IsMember({"on", "off"}))
+      ->needs(dynamic);
+}
+
 void SayResult(const pipeline::BuildOptions& options, const pipeline::BuildReport& report,
                Console& console) {
+  if (report.set.frames.size() > 1) {
+    console.Say(
+        fmt::format("{}: {} time steps of:", options.output.string(), report.set.frames.size()));
+  }
   const auto& views = report.set.frames.front().views;
   const auto held_out = std::count_if(
       views.begin(), views.end(), [](const View& view) { return view.role == ViewRole::kHeldOut; });
@@ -43,7 +84,9 @@ void AddBuildCommand(CLI::App& app) {
   AddCommand(
       app, "build", "Build a D+TR set from photos or videos",
       "dtr build photos/ -o scene.dtr --holdout every:8", [](CLI::App& command) -> Action {
-        auto options = std::make_shared<pipeline::BuildOptions>();
+        auto arguments = std::make_shared<BuildArguments>();
+        pipeline::BuildOptions* options = &arguments->options;
+        AddDynamicOptions(command, *arguments);
         command
             .add_option("PHOTOS", options->photos,
                         "Folder of photos, a video, or a folder of videos")
@@ -101,12 +144,16 @@ void AddBuildCommand(CLI::App& app) {
                         "Of an interrupted build: do this stage and all after it again")
             ->check(CLI::IsMember(pipeline::StagesKept()))
             ->type_name("NAME");
-        return [options, words](const Context& context) -> int {
+        return [arguments, options, words](const Context& context) -> int {
           context.console.KeepsWork();
           options->metres = MetreOptionsFrom(options->metres.gps, *words);
           options->threads = context.common.threads;
           options->seed = context.common.seed;
-          const auto report = pipeline::BuildSet(*options, context.console);
+          arguments->dynamic.temporal = arguments->temporal == "on";
+          const auto report =
+              arguments->is_dynamic
+                  ? pipeline::BuildDynamicSet(*options, arguments->dynamic, context.console)
+                  : pipeline::BuildSet(*options, context.console);
           SayResult(*options, report, context.console);
           context.EmitJson(pipeline::ToJson(report));
           return kDone;

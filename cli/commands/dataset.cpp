@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "capture/contents_json.h"
 #include "capture/ingest.h"
@@ -41,6 +42,7 @@ void AddList(CLI::App& dataset) {
 
 struct MakeOptions {
   datasets::DatasetSpec spec;
+  std::optional<int> views, width_px, height_px, steps;  // the scene has its own defaults
   fs::path output;
   std::vector<double> offset;
 };
@@ -48,15 +50,25 @@ struct MakeOptions {
 void DeclareMakeOptions(CLI::App& command, MakeOptions& options) {
   datasets::DatasetSpec& spec = options.spec;
   command
-      .add_option("NAME", spec.scene, "Scene: courtyard, plane, stairs, sphere, room or plain-room")
+      .add_option("NAME", spec.scene,
+                  "Scene: courtyard, plane, stairs, sphere, room, plain-room or toys")
       ->required();
   command.add_option("-o,--output", options.output, "Folder to write")
       ->required()
       ->type_name("DIR");
   command.add_option("--layout", spec.layout, "Cameras: arc, grid, ring, line or inside-out");
-  command.add_option("--views", spec.views, "Number of photos [16]")->type_name("N");
-  command.add_option("--width", spec.width_px, "Photo width [960]")->type_name("PX");
-  command.add_option("--height", spec.height_px, "Photo height [640]")->type_name("PX");
+  command.add_option("--views", options.views, "Number of cameras [16; toys 8]")->type_name("N");
+  command.add_option("--width", options.width_px, "Photo width [960; toys 320]")->type_name("PX");
+  command.add_option("--height", options.height_px, "Photo height [640; toys 216]")
+      ->type_name("PX");
+  command
+      .add_option("--steps", options.steps,
+                  "Time steps, of scenes that move: photos of every camera, rig.json and truth "
+                  "for each [1; toys 30]")
+      ->type_name("N");
+  command.add_option("--fps", spec.steps_per_second, "Time steps per second [10]")->type_name("N");
+  command.add_flag("--videos", spec.videos,
+                   "Of several time steps: a lossless video of every camera instead of photos");
   command.add_flag("--panoramas", spec.panoramas,
                    "360 degree panoramas of that width, half as high, with the views of a cube "
                    "around each");
@@ -74,7 +86,8 @@ void DeclareMakeOptions(CLI::App& command, MakeOptions& options) {
   command.add_option("--world-offset", options.offset, "Where the written world has its origin")
       ->expected(3)
       ->type_name("X Y Z");
-  command.add_option("--time", spec.time_s, "Time in seconds, for dynamic scenes: sphere [0]")
+  command
+      .add_option("--time", spec.time_s, "Time in seconds, for dynamic scenes: sphere, toys [0]")
       ->type_name("S");
   command.add_option("--scale", spec.scale, "Size of the written world [1]");
 }
@@ -87,14 +100,23 @@ void AddMake(CLI::App& dataset) {
         DeclareMakeOptions(command, *options);
         return [options](const Context& context) -> int {
           datasets::DatasetSpec spec = options->spec;
+          const datasets::DatasetSpec own = datasets::DefaultSpecOf(spec.scene);
+          spec.views = options->views.value_or(own.views);
+          spec.width_px = options->width_px.value_or(own.width_px);
+          spec.height_px = options->height_px.value_or(own.height_px);
+          spec.steps = options->steps.value_or(own.steps);
           // --seed 0, the default of every command, keeps the scene's own seed.
           if (context.common.seed != 0) spec.seed = context.common.seed;
           if (!options->offset.empty()) {
             spec.world_offset = {options->offset[0], options->offset[1], options->offset[2]};
           }
           datasets::MakeDataset(spec, options->output, context.common.threads, context.console);
-          context.console.Say(
-              fmt::format("{}: {} photos of {}", options->output.string(), spec.views, spec.scene));
+          context.console.Say(spec.steps == 1
+                                  ? fmt::format("{}: {} photos of {}", options->output.string(),
+                                                spec.views, spec.scene)
+                                  : fmt::format("{}: {} cameras, {} time steps of {}",
+                                                options->output.string(), spec.views, spec.steps,
+                                                spec.scene));
           context.EmitJson(datasets::FormatSpecJson(spec));
           return kDone;
         };

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "cli/command.h"
 #include "cli/render_options.h"
@@ -76,6 +77,35 @@ void SayDepth(const eval::DepthScores& depth, Console& console) {
                           percent(outliers.at(4)), percent(outliers.at(8))));
 }
 
+void SayFlicker(const eval::FlickerScores& flicker, Console& console) {
+  const auto percent = [](const std::optional<double>& share) {
+    return share ? fmt::format("{:.4f} %", 100 * *share) : std::string("-");
+  };
+  console.Say(fmt::format(
+      "flicker where truth stands still ({} pixels): standard deviation of depth over time {} of "
+      "depth in the mean, {} in the median; depth comes or goes in {} of the time steps",
+      flicker.pixels, percent(flicker.mean_relative_deviation),
+      percent(flicker.median_relative_deviation), percent(flicker.come_and_go_share)));
+}
+
+// Of a dynamic set, with what the report of a still one has in the same places.
+std::string JsonOverTime(const pipeline::EvaluateResult& result) {
+  auto json = nlohmann::ordered_json::parse(eval::ToJson(result.views, result.depth));
+  json["time_steps"] = result.time_steps;
+  if (result.flicker) {
+    const auto number = [](const std::optional<double>& value) {
+      return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json(nullptr);
+    };
+    json["flicker"] = {
+        {"still_pixels", result.flicker->still_pixels},
+        {"pixels", result.flicker->pixels},
+        {"mean_relative_deviation", number(result.flicker->mean_relative_deviation)},
+        {"median_relative_deviation", number(result.flicker->median_relative_deviation)},
+        {"come_and_go_share", number(result.flicker->come_and_go_share)}};
+  }
+  return json.dump(2);
+}
+
 int RunEvaluate(const EvaluateArguments& options, const Context& context) {
   pipeline::EvaluateRequest request = options.request;
   request.render = *options.render;
@@ -84,7 +114,9 @@ int RunEvaluate(const EvaluateArguments& options, const Context& context) {
       request, [&] { return MakeRenderer(options.renderer, context.console); }, context.console);
   SayReport(result.views, context.console);
   if (result.depth) SayDepth(*result.depth, context.console);
-  context.EmitJson(eval::ToJson(result.views, result.depth));
+  if (result.flicker) SayFlicker(*result.flicker, context.console);
+  context.EmitJson(result.time_steps > 1 ? JsonOverTime(result)
+                                         : eval::ToJson(result.views, result.depth));
   return kDone;
 }
 

@@ -1,7 +1,9 @@
 // The writing half of set_io.h.
 #include <algorithm>
+#include <map>
 #include <set>
 #include <stdexcept>
+#include <utility>
 
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
@@ -104,6 +106,23 @@ auto AsError(const Function& function) {
     return function();
   } catch (const fs::filesystem_error& error) {
     throw Error(std::string("set cannot be written: ") + error.what());
+  }
+}
+
+// What is the same at several time steps is stored once: all its views name the first one's file.
+void ShareEqualFiles(DtrSet& set) {
+  std::map<std::pair<std::string, std::uint64_t>, std::string> path_of;
+  for (Frame& frame : set.frames) {
+    for (View& view : frame.views) {
+      if (view.role != ViewRole::kSource) continue;  // those of held-out views have no hash here
+      for (auto* file : {&view.image_file, &view.mask_file, &view.depth_file, &view.completed_file,
+                         &view.sigma_file, &view.mesh_file}) {
+        if (!*file) continue;
+        const auto first =
+            path_of.emplace(std::pair((*file)->sha256, (*file)->bytes), (*file)->path);
+        (*file)->path = first.first->second;
+      }
+    }
   }
 }
 
@@ -479,6 +498,7 @@ void SetWriter::State::MoveIntoPlace() {
 
 void SetWriter::Finish(DtrSet& set) {
   State& state = *state_;
+  if (set.frames.size() > 1) ShareEqualFiles(set);
   const fs::path file = state.partial / kSetFile;
   const std::string text = JsonFromSet(set, file.string());
   const fs::path held_out_file = state.partial / kHeldOutFiles;

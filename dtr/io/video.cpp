@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <string>
+#include <vector>
+
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/process.h"
@@ -9,11 +12,43 @@
 
 namespace dtr::io {
 namespace fs = std::filesystem;
+namespace {
 
-VideoWriter::VideoWriter(fs::path target, int frames_per_second)
+// How FFmpeg shall encode, as words of its command line.
+std::vector<std::string> WordsOf(VideoCoding coding) {
+  if (coding == VideoCoding::kLossless) {
+    return {"-c:v", "ffv1", "-level", "3", "-pix_fmt", "gbrp"};
+  }
+  // yuv420p, which every player knows, needs even sizes: an odd frame gains one row or column.
+  // FFmpeg would code with BT.601's matrix and not say so, and players take BT.709's for HD.
+  return {"-vf",
+          "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv:flags=accurate_"
+          "rnd",
+          "-colorspace",
+          "bt709",
+          "-color_primaries",
+          "bt709",
+          "-color_trc",
+          "iec61966-2-1",
+          "-color_range",
+          "tv",
+          "-c:v",
+          "libx264",
+          "-crf",
+          "18",
+          "-pix_fmt",
+          "yuv420p",
+          "-movflags",
+          "+faststart"};
+}
+
+}  // namespace
+
+VideoWriter::VideoWriter(fs::path target, int frames_per_second, VideoCoding coding)
     : target_(std::move(target)),
       frames_(WorkFolder::Of(target_), "video"),
-      frames_per_second_(frames_per_second) {
+      frames_per_second_(frames_per_second),
+      coding_(coding) {
   if (FindProgram("ffmpeg").empty()) {
     throw Error(target_.string() +
                 ": program ffmpeg not found on the PATH; install it or write images to a folder");
@@ -27,44 +62,20 @@ void VideoWriter::Add(const ImageRgb8& frame) {
 void VideoWriter::Finish(const Progress& progress) {
   const fs::path& frames = frames_.path();
   // ffmpeg takes "%" and ":" in a path for words of its own: it sees names of ours alone.
-  const char* encoded = "video.mp4";
+  const char* encoded = coding_ == VideoCoding::kH264 ? "video.mp4" : "video.mkv";
   ProcessOptions options;
   options.log_file = frames / "ffmpeg.log";
   options.working_directory = frames;
   std::string last_line;
   options.on_line = [&last_line](const std::string& line) { last_line = line; };
   options.should_stop = [&progress] { return progress.StopRequested(); };
-  // yuv420p, which every player knows, needs even sizes: an odd frame gains one row or column.
-  // FFmpeg would code with BT.601's matrix and not say so, and players take BT.709's for HD.
-  const auto result = RunProcess(
-      {"ffmpeg",
-       "-y",
-       "-loglevel",
-       "error",
-       "-framerate",
-       std::to_string(frames_per_second_),
-       "-i",
-       "%06d.png",
-       "-vf",
-       "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd",
-       "-colorspace",
-       "bt709",
-       "-color_primaries",
-       "bt709",
-       "-color_trc",
-       "iec61966-2-1",
-       "-color_range",
-       "tv",
-       "-c:v",
-       "libx264",
-       "-crf",
-       "18",
-       "-pix_fmt",
-       "yuv420p",
-       "-movflags",
-       "+faststart",
-       encoded},
-      options);
+  std::vector<std::string> command{"ffmpeg", "-y",         "-loglevel",
+                                   "error",  "-framerate", std::to_string(frames_per_second_),
+                                   "-i",     "%06d.png"};
+  const std::vector<std::string> words = WordsOf(coding_);
+  command.insert(command.end(), words.begin(), words.end());
+  command.push_back(encoded);
+  const auto result = RunProcess(command, options);
   progress.ThrowIfInterrupted();
   if (!result.Ok()) {
     throw Error(fmt::format("{}: ffmpeg failed with exit code {}: {}", target_.string(),

@@ -47,6 +47,12 @@ void Put(State::Hypothesis* hypothesis, int x, int y, float w, const Vector& pla
 
 }  // namespace
 
+float MeanPxPerInverseDepth(const Level& level) {
+  float sum = 0;
+  for (const Source& s : level.sources) sum += PxPerInverseDepth(level, s);
+  return sum / static_cast<float>(level.sources.size());
+}
+
 void HypothesesFromSurfaces(const Level& level, State* state) {
   const int width = level.reference.width, height = level.reference.height;
   const BorderedGrid none(width, height, 0);
@@ -75,6 +81,7 @@ void HypothesesFromSurfaces(const Level& level, State* state) {
           continue;
         }
         const int x = static_cast<int>(px), y = static_cast<int>(py);
+        if (level.open && *level.open->at(x, y) == 0) continue;
         // In the source 1/z = n . (u, v, 1), so H = m + k n^T and here 1/z = H^-T n . (x, y, 1);
         // H^-T n = m^-T n / (1 + k . m^-T n) (Sherman and Morrison, 1950).
         Vector n(s.surface_scale * map.slope_x(u, v), s.surface_scale * map.slope_y(u, v), 0);

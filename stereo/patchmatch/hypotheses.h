@@ -9,4 +9,8 @@ namespace dtr::stereo::patchmatch {
 /// farthest are kept. Behind a thin or near thing, half the views look at what is wanted.
 void HypothesesFromSurfaces(const Level& level, State* state);
 
+/// Pixels that points move per unit of inverse depth, mean of the sources: of the image's centre,
+/// or of its corners where that tells nothing.
+float MeanPxPerInverseDepth(const Level& level);
+
 }  // namespace dtr::stereo::patchmatch

@@ -68,6 +68,20 @@ HWY_INLINE void StoreColour(VF value, int x, int y, int width, BorderedGrid* gri
   for (int i = 0; i < static_cast<int>(kLanes) && x + 2 * i < width; ++i) row[x + 2 * i] = lanes[i];
 }
 
+/// Whether work on a group is of no use: none of its pixels is open.
+HWY_INLINE bool AllSettled(const Level& level, int x, int y) {
+  return level.open && hn::AllFalse(DF(), hn::Gt(LoadColour(*level.open, x, y), hn::Zero(DF())));
+}
+
+/// Stores lanes whose pixel lies in the image and is open.
+HWY_INLINE void StoreOpen(const Level& level, VF value, int x, int y, BorderedGrid* grid) {
+  if (level.open) {
+    const auto open = hn::Gt(LoadColour(*level.open, x, y), hn::Zero(DF()));
+    value = hn::IfThenElse(open, value, LoadColour(*grid, x, y));
+  }
+  StoreColour(value, x, y, level.reference.width, grid);
+}
+
 /// Keeps, per lane, the pixel at (dx, dy) if it is cheaper than the cheapest so far.
 HWY_INLINE void Cheaper(const State& state, int x, int y, int dx, int dy, VF* cost, VF* at_x,
                         VF* at_y) {
@@ -366,16 +380,17 @@ std::int64_t SweepRowImpl(const Level& level, const Sweep& sweep, int y, State* 
   Best best;
   Group g;
   for (int x = (y + sweep.colour) % 2; x < width; x += 2 * static_cast<int>(kLanes)) {
+    if (AllSettled(level, x, y)) continue;
     PrepareGroup(level, x, y, &g);
     CollectCandidates(level, *state, g, sweep.far_regions, &candidates);
     ChooseJointly(level, sweep, *state, g, &candidates, &best);
     Refine(level, sweep, *state, g, &best);
-    StoreColour(hn::Load(d, best.w), x, y, width, &state->w);
-    StoreColour(hn::Load(d, best.a), x, y, width, &state->a);
-    StoreColour(hn::Load(d, best.b), x, y, width, &state->b);
-    StoreColour(hn::Load(d, best.cost), x, y, width, &state->cost);
+    StoreOpen(level, hn::Load(d, best.w), x, y, &state->w);
+    StoreOpen(level, hn::Load(d, best.a), x, y, &state->a);
+    StoreOpen(level, hn::Load(d, best.b), x, y, &state->b);
+    StoreOpen(level, hn::Load(d, best.cost), x, y, &state->cost);
     for (size_t v = 0; v < level.sources.size(); ++v) {
-      StoreColour(hn::Load(d, best.weight[v]), x, y, width, &state->weight[v]);
+      StoreOpen(level, hn::Load(d, best.weight[v]), x, y, &state->weight[v]);
     }
   }
   return g.samples;
@@ -390,6 +405,7 @@ void ExpectRowImpl(const Level& level, int y, State* state) {
   Group g;
   for (int start = 0; start < 2; ++start) {
     for (int x = start; x < width; x += 2 * static_cast<int>(kLanes)) {
+      if (AllSettled(level, x, y)) continue;
       PlaceGroup(level, x, y, &g);
       const VF w = LoadColour(state->w, x, y);
       const VF a = LoadColour(state->a, x, y), b = LoadColour(state->b, x, y);
@@ -425,6 +441,7 @@ std::int64_t SearchRowImpl(const Level& level, int samples, int y, State* state)
   for (auto& lanes : equal) hn::Store(hn::Set(d, 1.0f / static_cast<float>(views)), d, lanes);
   Group g;
   for (int x = (y + kGuessedColour) % 2; x < width; x += 2 * static_cast<int>(kLanes)) {
+    if (AllSettled(level, x, y)) continue;
     PrepareGroup(level, x, y, &g);
     VF best = infinity, best_w = hn::Set(d, level.w_min);
     VF best_a = hn::Zero(d), best_b = hn::Zero(d);
@@ -451,12 +468,12 @@ std::int64_t SearchRowImpl(const Level& level, int samples, int y, State* state)
       best_a = hn::IfThenElse(less, a, best_a);
       best_b = hn::IfThenElse(less, b, best_b);
     }
-    StoreColour(best_w, x, y, width, &state->w);
-    StoreColour(best_a, x, y, width, &state->a);
-    StoreColour(best_b, x, y, width, &state->b);
-    StoreColour(best, x, y, width, &state->cost);
+    StoreOpen(level, best_w, x, y, &state->w);
+    StoreOpen(level, best_a, x, y, &state->a);
+    StoreOpen(level, best_b, x, y, &state->b);
+    StoreOpen(level, best, x, y, &state->cost);
     for (size_t v = 0; v < views; ++v) {
-      StoreColour(hn::Load(d, equal[v]), x, y, width, &state->weight[v]);
+      StoreOpen(level, hn::Load(d, equal[v]), x, y, &state->weight[v]);
     }
   }
   return g.samples;
@@ -495,8 +512,9 @@ void EstimateRow(const Level& level, const State& state, int y, const float* wan
                  PixelEstimate* out) {
   HWY_DYNAMIC_DISPATCH(EstimateRowImpl)(level, state, y, wanted, out);
 }
-void AmbiguousRow(const Level& level, const State& state, int y, std::uint8_t* ambiguous) {
-  HWY_DYNAMIC_DISPATCH(AmbiguousRowImpl)(level, state, y, ambiguous);
+void AmbiguousRow(const Level& level, const State& state, int y, const float* wanted,
+                  std::uint8_t* ambiguous) {
+  HWY_DYNAMIC_DISPATCH(AmbiguousRowImpl)(level, state, y, wanted, ambiguous);
 }
 const char* InstructionSet() { return HWY_DYNAMIC_DISPATCH(TargetName)(); }
 

@@ -105,6 +105,7 @@ struct Level {
   Reference reference;
   std::vector<Source> sources;
   std::optional<Expected> expected;
+  std::optional<BorderedGrid> open;  ///< 1: worked on, 0: left as it is; none: all are worked on
   float w_min = 0, w_max = 1;
   std::uint64_t seed = 0;
 };
@@ -158,8 +159,10 @@ void EstimateRow(const Level& level, const State& state, int y, const float* wan
 
 /// Whether other places on a pixel's ray match about as well as its plane: where a texture repeats
 /// within 12 pixels of disparity, and at infinity, where images are copies or mirrors show far
-/// things. Worked out for pixels 0, 2, 4, ... of the row: ambiguous[x / 2] is 1 or 0.
-void AmbiguousRow(const Level& level, const State& state, int y, std::uint8_t* ambiguous);
+/// things. Worked out for pixels 0, 2, 4, ... of the row: ambiguous[x / 2] is 1 or 0. `wanted` as
+/// for EstimateRow; what is left out stays as it was.
+void AmbiguousRow(const Level& level, const State& state, int y, const float* wanted,
+                  std::uint8_t* ambiguous);
 
 /// Photometric cost, 1 - NCC, of each pixel's plane in the first source, moved by each of `steps`
 /// in inverse depth: costs[n * width + x]. Nothing but the kernel, for tests and benchmarks;

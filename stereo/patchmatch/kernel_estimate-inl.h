@@ -183,8 +183,17 @@ VF RivalsOdds(const Level& level, const Group& g, const float (*weights)[kLanes]
   return odds;
 }
 
+/// Whether any pixel of a group is wanted.
+bool AnyWanted(const float* wanted, int x, int width) {
+  for (int i = 0; i < static_cast<int>(kLanes) && x + 2 * i < width; ++i) {
+    if (wanted[x + 2 * i] != 0) return true;
+  }
+  return false;
+}
+
 /// See AmbiguousRow.
-void AmbiguousRowImpl(const Level& level, const State& state, int y, std::uint8_t* ambiguous) {
+void AmbiguousRowImpl(const Level& level, const State& state, int y, const float* wanted,
+                      std::uint8_t* ambiguous) {
   const DF d;
   const int width = level.reference.width;
   HWY_ALIGN float weights[kMaxViews][kLanes];
@@ -192,6 +201,7 @@ void AmbiguousRowImpl(const Level& level, const State& state, int y, std::uint8_
   Said said;
   Group g;
   for (int x = 0; x < width; x += 2 * static_cast<int>(kLanes)) {
+    if (wanted != nullptr && !AnyWanted(wanted, x, width)) continue;
     PrepareGroup(level, x, y, &g);
     const VF w = LoadColour(state.w, x, y);
     const VF a = LoadColour(state.a, x, y), b = LoadColour(state.b, x, y);
@@ -335,14 +345,6 @@ void EstimateGroup(const Level& level, const State& state, const Group& g, Pixel
                         static_cast<int>(lanes[4][i]),
                         static_cast<int>(lanes[5][i])};
   }
-}
-
-/// Whether any pixel of a group is wanted.
-bool AnyWanted(const float* wanted, int x, int width) {
-  for (int i = 0; i < static_cast<int>(kLanes) && x + 2 * i < width; ++i) {
-    if (wanted[x + 2 * i] != 0) return true;
-  }
-  return false;
 }
 
 void EstimateRowImpl(const Level& level, const State& state, int y, const float* wanted,

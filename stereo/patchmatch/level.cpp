@@ -214,6 +214,33 @@ State StateOf(const Level& level, const PlaneMap& map, const DepthRange& range) 
   return state;
 }
 
+BorderedGrid OpenPixels(const Level& level, const Mask& open, int side) {
+  const int w = level.reference.width, h = level.reference.height;
+  BorderedGrid pixels(w, h, 0);
+  for (int y = 0; y < open.height(); ++y) {
+    const int level_y = std::min(y / side, h - 1);
+    for (int x = 0; x < open.width(); ++x) {
+      if (open(x, y) != 0) *pixels.at(std::min(x / side, w - 1), level_y) = 1;
+    }
+  }
+  return pixels;
+}
+
+State::Hypothesis HypothesisOf(const Level& level, const PlaneMap& map, const DepthRange& range) {
+  const int width = level.reference.width, height = level.reference.height;
+  const BorderedGrid none(width, height, 0);
+  State::Hypothesis hypothesis{none, none, none};
+  const auto scale = static_cast<float>(range.near_z / map.unit_z);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      *hypothesis.w.at(x, y) = scale * map.inverse_depth(x, y);
+      *hypothesis.a.at(x, y) = scale * map.slope_x(x, y);
+      *hypothesis.b.at(x, y) = scale * map.slope_y(x, y);
+    }
+  }
+  return hypothesis;
+}
+
 State Upsampled(const State& coarse, const Level& coarse_level, const Level& level) {
   State state = EmptyState(level);
   for (int y = 0; y < level.reference.height; ++y) {

@@ -36,6 +36,13 @@ State EmptyState(const Level& level);
 PlaneMap PlanesOf(const Level& level, const State& state, const DepthRange& range);
 State StateOf(const Level& level, const PlaneMap& map, const DepthRange& range);
 
+/// Which pixels of a level, a block of `side` x `side` pixels of the mask each, hold one that is
+/// open; `open` covers the level, as the image of the view does.
+BorderedGrid OpenPixels(const Level& level, const Mask& open, int side);
+
+/// A plane at every pixel, as a suggestion; w is 0 where `map` has none.
+State::Hypothesis HypothesisOf(const Level& level, const PlaneMap& map, const DepthRange& range);
+
 /// Planes of a coarser level on the grid of the next finer one.
 State Upsampled(const State& coarse, const Level& coarse_level, const Level& level);
 

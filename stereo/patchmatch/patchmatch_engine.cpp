@@ -13,6 +13,7 @@
 #include "stereo/patchmatch/level.h"
 #include "stereo/patchmatch/trust.h"
 #include "stereo/prior_use.h"
+#include "stereo/time_step.h"
 
 namespace dtr::stereo {
 namespace {
@@ -31,6 +32,11 @@ constexpr float kFirstStepPx = 4.0f, kFinestStepPx = 1.0f;
 constexpr int kLookIterations = 1;
 /// Visits per pixel in each round of geometric consistency.
 constexpr int kRefineIterations = 1;
+/// Visits per open pixel that begins with its plane of the time step before.
+constexpr int kFollowIterations = 3;
+/// Open pixels whose followed plane costs more than this are searched for from nothing.
+constexpr float kLostCost = 0.5f;
+constexpr int kFollowRoundNumber = 500;  // names its random numbers apart from the search's
 constexpr int kFirstRoundNumber = 1000;  // names random numbers apart from the search's
 /// A pair whose rays to the middle of the range meet at less than this has no baseline.
 constexpr double kSmallestDisparityPx = 0.5;
@@ -40,6 +46,9 @@ constexpr double kSmallestDisparityPx = 0.5;
 /// hand out; a depth map with what evaluating it takes; a neighbour's textures with all halvings.
 constexpr double kReferenceBytes = 12, kStateBytes = 16, kWeightBytes = 4, kGuessBytes = 28,
                  kImageBytes = 7, kPlaneBytes = 12, kEstimateBytes = 54, kSourceBytes = 7;
+/// What a view's time step takes beside TimeStepBytes: which pixels are open, suggested planes, and
+/// what was found for lost ones.
+constexpr double kOpenBytes = 4 + 12, kLostBytes = 1 + kPlaneBytes;
 /// What a prior takes at the reference's pixels, of two levels in the search, beside PriorBytes.
 constexpr double kExpectedBytes = 16;
 constexpr double kSmallThingsBytes = 1 << 18;
@@ -124,15 +133,15 @@ void RunSweeps(const Level& level, Sweep sweep, int iterations, float step_px, i
 /// Planes of the finest level. `expect` sets what a level's pixels are expected to show.
 State SearchPyramid(const StereoView& view, std::span<const GreyImage> pictures,
                     std::span<const SourcePyramid> sources, const DepthRange& range, int iterations,
-                    const EngineOptions& options, const std::function<void(Level*)>& expect,
-                    Level* finest) {
+                    const EngineOptions& options,
+                    const std::function<void(size_t index, Level*)>& expect, Level* finest) {
   State state;
   Level level, coarser;
   int round = 0;
   for (size_t index = pictures.size(); index-- > 0; coarser = std::move(level)) {
     const std::uint64_t seed = HashOf(options.seed, index);
     level = MakeLevel(view, pictures[index], sources, index, range, seed);
-    expect(&level);
+    expect(index, &level);
     const bool coarsest = index + 1 == pictures.size();
     if (coarsest) {
       double range_px = 0;
@@ -160,6 +169,30 @@ State SearchPyramid(const StereoView& view, std::span<const GreyImage> pictures,
   return state;
 }
 
+/// Open pixels whose plane the photos do not support.
+Mask LostPixels(const Level& level, const State& state, const Mask& open) {
+  Mask lost(open.width(), open.height());
+  for (int y = 0; y < level.reference.height; ++y) {
+    for (int x = 0; x < level.reference.width; ++x) {
+      if (open(x, y) != 0 && !(*state.cost.at(x, y) <= kLostCost)) lost(x, y) = 255;
+    }
+  }
+  return lost;
+}
+
+/// Takes what was found for lost pixels where it costs less.
+void TakeCheaper(const State& found, const Mask& lost, State* state) {
+  for (int y = 0; y < lost.height(); ++y) {
+    for (int x = 0; x < lost.width(); ++x) {
+      if (lost(x, y) == 0 || !(*found.cost.at(x, y) < *state->cost.at(x, y))) continue;
+      *state->w.at(x, y) = *found.w.at(x, y);
+      *state->a.at(x, y) = *found.a.at(x, y);
+      *state->b.at(x, y) = *found.b.at(x, y);
+      *state->cost.at(x, y) = *found.cost.at(x, y);
+    }
+  }
+}
+
 /// What is matched with what, at all sizes.
 struct Problem {
   Problem(std::span<const StereoView> views, int reference, std::span<const int> neighbours,
@@ -172,22 +205,52 @@ struct Problem {
     sources = MakeSources(views, reference, neighbours, range, maps, max_sources, levels,
                           options.threads);
     if (view->prior != nullptr) prior.emplace(view->prior->load());
+    if (view->time_step != nullptr) time_step = view->time_step->load();
   }
 
-  void Expect(Level* level, int threads) const {
+  /// What is known of a level's pixels beside the photos.
+  void Expect(size_t index, const Mask* open, int threads, Level* level) const {
     if (prior) level->expected = ExpectedOf(*level, *prior, view->prior->noise, range, threads);
+    if (open != nullptr) level->open = OpenPixels(*level, *open, 1 << index);
   }
+  const Mask* Open() const { return time_step ? &time_step->open : nullptr; }
 
-  State Search(int iterations, const EngineOptions& options) {
+  State Search(int iterations, const Mask* open, const EngineOptions& options) {
     return SearchPyramid(
         *view, pictures, sources, range, iterations, options,
-        [&](Level* level) { Expect(level, options.threads); }, &finest);
+        [&](size_t index, Level* level) { Expect(index, open, options.threads, level); }, &finest);
   }
 
   State Resume(const PlaneMap& map, const EngineOptions& options) {
     finest = MakeLevel(*view, pictures[0], sources, 0, range, HashOf(options.seed, 0));
-    Expect(&finest, options.threads);
+    Expect(0, Open(), options.threads, &finest);
     return StateOf(finest, map, range);
+  }
+
+  /// Open pixels begin with their planes of the time step before, which the photos of this one
+  /// check as every sweep does, next to those of what stands still; where they are lost, they are
+  /// searched for as in a view that stands alone.
+  State Follow(int iterations, const EngineOptions& options) {
+    PlaneMap begin = time_step->before;
+    KeepSettledPlanes(*time_step, &begin);
+    State state = Resume(begin, options);
+    SuggestBackground(&state);
+    Sweep sweep;
+    int number = kFollowRoundNumber;
+    RunSweeps(finest, sweep, kFollowIterations, 2 * kFinestStepPx, options.threads, &number,
+              &state);
+    const Mask lost = LostPixels(finest, state, time_step->open);
+    if (std::none_of(lost.data().begin(), lost.data().end(), [](auto m) { return m != 0; })) {
+      return state;
+    }
+    const State found = Search(iterations, &lost, options);
+    TakeCheaper(found, lost, &state);
+    return state;
+  }
+
+  void SuggestBackground(State* state) const {
+    if (!time_step || time_step->background.empty()) return;
+    state->hypotheses.push_back(HypothesisOf(finest, time_step->background, range));
   }
 
   const StereoView* view;
@@ -195,14 +258,15 @@ struct Problem {
   std::vector<GreyImage> pictures;
   std::vector<SourcePyramid> sources;
   std::optional<PriorPlanes> prior;
+  std::shared_ptr<const TimeStep> time_step;  ///< null: the view stands alone
   Level finest;
 };
 
 DepthEstimate Assessed(const Problem& problem, int threads, State* state,
                        std::atomic<int>* without_planes) {
   bool planes_left_out = false;
-  DepthEstimate estimate =
-      TrustedDepth(problem.finest, *problem.view, problem.range, threads, state, &planes_left_out);
+  DepthEstimate estimate = TrustedDepth(problem.finest, *problem.view, problem.range, threads,
+                                        problem.time_step.get(), state, &planes_left_out);
   *without_planes += planes_left_out ? 1 : 0;
   return estimate;
 }
@@ -233,6 +297,10 @@ std::uint64_t PatchMatchEngine::WorkBytes(std::span<const StereoView> views, int
                                                   area(w, h, 0) * kPlaneBytes;
   double bytes = kSmallThingsBytes + std::max(search, round) + area(w, h, 0) * kImageBytes;
   if (has_prior) bytes += static_cast<double>(PriorBytes(camera));
+  if (views[static_cast<size_t>(reference)].time_step != nullptr) {
+    bytes += static_cast<double>(TimeStepBytes(camera)) +
+             area(w, h, kBorder) * (kOpenBytes + state) + area(w, h, 0) * kLostBytes;
+  }
   for (size_t i = 0; i < sources; ++i) {
     const PinholeCamera& c = views[static_cast<size_t>(neighbours[i])].camera;
     bytes += kSourceBytes * area(c.width_px(), c.height_px(), kTextureBorder);
@@ -244,7 +312,8 @@ DepthEstimate PatchMatchEngine::Estimate(std::span<const StereoView> views, int 
                                          std::span<const int> neighbours, const DepthRange& range,
                                          const EngineOptions& options) const {
   Problem problem(views, reference, neighbours, range, {}, Neighbours(), options);
-  State state = problem.Search(options.look ? kLookIterations : quality_.iterations, options);
+  State state =
+      problem.Search(options.look ? kLookIterations : quality_.iterations, problem.Open(), options);
   return Assessed(problem, options.threads, &state, &without_planes_);
 }
 
@@ -252,7 +321,12 @@ PlaneMap PatchMatchEngine::Match(std::span<const StereoView> views, int referenc
                                  std::span<const int> neighbours, const DepthRange& range,
                                  const EngineOptions& options) const {
   Problem problem(views, reference, neighbours, range, {}, quality_.neighbours, options);
-  return PlanesOf(problem.finest, problem.Search(quality_.iterations, options), range);
+  const bool follows = problem.time_step && !problem.time_step->before.empty();
+  const State state = follows ? problem.Follow(quality_.iterations, options)
+                              : problem.Search(quality_.iterations, problem.Open(), options);
+  PlaneMap map = PlanesOf(problem.finest, state, range);
+  if (problem.time_step) KeepSettledPlanes(*problem.time_step, &map);
+  return map;
 }
 
 PlaneMap PatchMatchEngine::Refine(std::span<const StereoView> views, int reference,
@@ -262,6 +336,7 @@ PlaneMap PatchMatchEngine::Refine(std::span<const StereoView> views, int referen
   Problem problem(views, reference, neighbours, range, maps, quality_.round_neighbours, options);
   State state = problem.Resume(*maps[static_cast<size_t>(reference)], options);
   HypothesesFromSurfaces(problem.finest, &state);
+  problem.SuggestBackground(&state);
   ParallelFor(0, problem.finest.reference.height, options.threads,
               [&](int y) { ExpectRow(problem.finest, y, &state); });
   Sweep sweep;
@@ -270,7 +345,9 @@ PlaneMap PatchMatchEngine::Refine(std::span<const StereoView> views, int referen
   int number = kFirstRoundNumber * round;
   RunSweeps(problem.finest, sweep, kRefineIterations, kFinestStepPx, options.threads, &number,
             &state);
-  return PlanesOf(problem.finest, state, range);
+  PlaneMap map = PlanesOf(problem.finest, state, range);
+  if (problem.time_step) KeepSettledPlanes(*problem.time_step, &map);
+  return map;
 }
 
 DepthEstimate PatchMatchEngine::Filter(std::span<const StereoView> views, int reference,

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "dtr/base/parallel_for.h"
+#include "stereo/patchmatch/hypotheses.h"
 #include "stereo/patchmatch/planar_prior.h"
 #include "stereo/patchmatch/speckles.h"
 #include "stereo/prior_use.h"
@@ -80,12 +81,35 @@ void Combine(float prior, float prior_sigma, PixelEstimate* v) {
   v->sigma = 1 / std::sqrt(seen + expected);
 }
 
+/// Pixels of the row that asked row `v` stands for whose result an open pixel depends on.
+std::vector<float> AskedFor(const Level& level, int v) {
+  const int w = level.reference.width, h = level.reference.height;
+  const int reach = 2 * (kAskedAsideX + 1);
+  std::vector<float> wanted(static_cast<size_t>(w), 0);
+  const int from = std::max(0, kAskedRows * (v - kAskedAsideY));
+  const int to = std::min(h, kAskedRows * (v + kAskedAsideY + 1));
+  for (int y = from; y < to; ++y) {
+    const float* open = level.open->at(0, y);
+    int filled = 0;
+    for (int x = 0; x < w; ++x) {
+      if (open[x] == 0) continue;
+      filled = std::max(filled, x - reach);
+      for (const int end = std::min(w, x + reach + 1); filled < end; ++filled) {
+        wanted[static_cast<size_t>(filled)] = 1;
+      }
+    }
+  }
+  return wanted;
+}
+
 /// Makes holes of areas whose texture leaves several places open.
 void RemoveAmbiguous(const Level& level, const State& state, int threads, DepthEstimate* estimate) {
   const int w = level.reference.width, h = level.reference.height;
   Grid<std::uint8_t> asked((w + 1) / 2, (h + kAskedRows - 1) / kAskedRows);
   ParallelFor(0, asked.height(), threads, [&](int v) {
-    AmbiguousRow(level, state, std::min(h - 1, kAskedRows * v + kAskedRows / 2), asked.row(v));
+    const std::vector<float> wanted = level.open ? AskedFor(level, v) : std::vector<float>();
+    AmbiguousRow(level, state, std::min(h - 1, kAskedRows * v + kAskedRows / 2),
+                 level.open ? wanted.data() : nullptr, asked.row(v));
   });
   ParallelFor(0, asked.height(), threads, [&](int v) {
     for (int u = 0; u < asked.width(); ++u) {
@@ -116,11 +140,13 @@ bool HasSurfaces(const Level& level) {
 class Trust {
  public:
   Trust(const Level& level, const StereoView& view, const DepthRange& range, int threads,
-        State* state)
+        const TimeStep* time_step, State* state)
       : level_(level),
         view_(view),
         near_z_(range.near_z),
         threads_(threads),
+        time_step_(time_step),
+        typical_px_per_w_(time_step != nullptr ? MeanPxPerInverseDepth(level) : 0),
         state_(state),
         result_{DepthImage(width(), height()), Grid<float>(width(), height())} {}
 
@@ -130,9 +156,14 @@ class Trust {
     Grid<std::uint8_t> consistent(width(), height());
     ParallelFor(0, height(), threads_, [&](int y) {
       std::vector<PixelEstimate> row(static_cast<size_t>(width()));
-      EstimateRow(level_, *state_, y, nullptr, row.data());
+      EstimateRow(level_, *state_, y, level_.open ? level_.open->at(0, y) : nullptr, row.data());
       for (int x = 0; x < width(); ++x) {
         const PixelEstimate& v = row[static_cast<size_t>(x)];
+        if (IsSettled(x, y)) {
+          KeepSettled(x, y);
+          consistent(x, y) = kMaxViews;
+          continue;
+        }
         if (view_.mask != nullptr && !view_.mask->empty() && (*view_.mask)(x, y) == 0) continue;
         px_per_w_(x, y) = v.px;
         if (v.cost <= kWeakCost) cost_(x, y) = std::max(v.cost, kMinWeakCost);
@@ -211,11 +242,30 @@ class Trust {
     });
   }
 
-  DepthEstimate TakeResult() { return std::move(result_); }
+  DepthEstimate TakeResult() {
+    if (time_step_ != nullptr) KeepSettledDepth(*time_step_, &result_);
+    return std::move(result_);
+  }
 
  private:
   int width() const { return level_.reference.width; }
   int height() const { return level_.reference.height; }
+
+  bool IsSettled(int x, int y) const {
+    return time_step_ != nullptr && time_step_->open(x, y) == 0;
+  }
+
+  /// What is around open pixels: company for small areas, and support of the planes between.
+  void KeepSettled(int x, int y) {
+    const float z = time_step_->settled.depth(x, y);
+    if (DepthImage::IsHole(z)) return;
+    const float sigma = time_step_->settled.inverse_depth_sigma(x, y);
+    px_per_w_(x, y) = typical_px_per_w_;
+    believed_(x, y) = static_cast<float>(near_z_ / static_cast<double>(z));
+    sigma_px_(x, y) = static_cast<float>(static_cast<double>(sigma) * near_z_) * typical_px_per_w_;
+    result_.depth(x, y) = z;
+    result_.inverse_depth_sigma(x, y) = sigma;
+  }
 
   void Keep(int x, int y, const PixelEstimate& v) {
     // What lies beyond the range by no more than it may be wrong lies at its end.
@@ -248,6 +298,8 @@ class Trust {
   const StereoView& view_;
   const double near_z_;
   const int threads_;
+  const TimeStep* const time_step_;
+  const float typical_px_per_w_;  ///< of settled pixels, whose planes are not looked at
   State* const state_;
   DepthEstimate result_;
   Grid<float> px_per_w_{width(), height()};
@@ -259,8 +311,9 @@ class Trust {
 }  // namespace
 
 DepthEstimate TrustedDepth(const Level& level, const StereoView& view, const DepthRange& range,
-                           int threads, State* state, bool* planes_left_out) {
-  Trust trust(level, view, range, threads, state);
+                           int threads, const TimeStep* time_step, State* state,
+                           bool* planes_left_out) {
+  Trust trust(level, view, range, threads, time_step, state);
   trust.BelieveWhatIsSeen();
   trust.AskTheInstrument();
   int passes = 0;

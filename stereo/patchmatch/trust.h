@@ -2,6 +2,7 @@
 #pragma once
 #include "stereo/engine.h"
 #include "stereo/patchmatch/kernel.h"
+#include "stereo/time_step.h"
 
 namespace dtr::stereo::patchmatch {
 
@@ -10,8 +11,10 @@ namespace dtr::stereo::patchmatch {
 /// texture repeats. Where texture is weak or the minimum flat, reliable planes all around give a
 /// prior (PlanarPrior) that the pixel's own plane is combined with, or that stands in its place in
 /// `state` if the photos say no more against it. `planes_left_out`: hardly a pixel asks for that,
-/// and no planes were fitted.
+/// and no planes were fitted. With `time_step` (that of level.open) settled pixels keep their
+/// depth, and open ones alone are asked.
 DepthEstimate TrustedDepth(const Level& level, const StereoView& view, const DepthRange& range,
-                           int threads, State* state, bool* planes_left_out);
+                           int threads, const TimeStep* time_step, State* state,
+                           bool* planes_left_out);
 
 }  // namespace dtr::stereo::patchmatch

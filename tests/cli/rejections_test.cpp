@@ -16,7 +16,7 @@ TEST_F(Rejections, WhatIsNoDataSet) {
   };
   ExpectAllRejected({
       {kWrongUsage,
-       "scene: expected courtyard, plane, stairs, sphere, room or plain-room, found 'park'",
+       "scene: expected courtyard, plane, stairs, sphere, room, plain-room or toys, found 'park'",
        make("park", {})},
       {kWrongUsage, "for scene 'plane', found 'circle'", make("plane", {"--layout", "circle"})},
       {kWrongUsage, "views: expected 2 to", make("plane", {"--views", "1"})},

@@ -22,8 +22,10 @@ double RoundingInSigmas(const View& view) {
   const std::vector<float> sure =
       QuantilesOfPositive(view.inverse_depth_sigma->data(), std::array{kSurestShare});
   if (sure.empty()) return 0;
-  const io::DepthRangeOfMap range = io::RangeOf(view.depth);
-  const double step = InverseDepthCode(range.near_z, range.far_z).step();
+  const io::DepthRangeOfMap own = io::RangeOf(view.depth);
+  const bool given = view.far_z > 0;  // else codes will span the map's own depths
+  const double step =
+      InverseDepthCode(given ? view.near_z : own.near_z, given ? view.far_z : own.far_z).step();
   return step / kStepsPerDeviation / static_cast<double>(sure.front());
 }
 

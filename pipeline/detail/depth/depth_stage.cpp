@@ -130,6 +130,13 @@ class NormalFiles {
   std::filesystem::path work_, folder_;
 };
 
+// The range that codes of all time steps have, wider by what rounding to float can exceed it.
+void StoreWithin(const stereo::DepthRange& range, View& view) {
+  constexpr double kSlack = 1e-6;
+  view.near_z = range.near_z * (1 - kSlack);
+  view.far_z = range.far_z * (1 + kSlack);
+}
+
 void WriteDepth(View& view, stereo::DepthEstimate&& estimate, LengthUnit unit,
                 io::SetWriter& writer) {
   view.depth = std::move(estimate.depth);
@@ -168,8 +175,9 @@ DepthStageResult DepthStage(DtrSet& set, const SparseScene& sparse, const DepthC
                             io::SetWriter& writer, Progress& progress) {
   if (choice.engine == "none") {
     progress.Note("depth left out: `engine` none");
-    return {asked, std::nullopt};
+    return {asked, std::nullopt, {}};
   }
+  const std::filesystem::path work = options.work.empty() ? writer.work_folder() : options.work;
   std::vector<View>& views = set.frames.front().views;
   Sources sources(views);
   const SparseScene scene = SourceScene(sparse, views, sources.indices);
@@ -178,9 +186,13 @@ DepthStageResult DepthStage(DtrSet& set, const SparseScene& sparse, const DepthC
   };
 
   stereo::DepthMapsOptions depth_options;
-  depth_options.widenings = kWidenings;
+  depth_options.widenings = options.ranges.empty() ? kWidenings : 0;
+  depth_options.given_ranges = options.ranges;
   for (const int index : sources.indices) {
     depth_options.range.names.push_back(views[static_cast<size_t>(index)].name);
+  }
+  for (size_t i = 0; i < options.time_steps.size(); ++i) {
+    sources.stereo[i].time_step = &options.time_steps[i];
   }
   std::optional<DepthPriors> priors;
   if (choice.prior.given()) {
@@ -210,22 +222,23 @@ DepthStageResult DepthStage(DtrSet& set, const SparseScene& sparse, const DepthC
   };
   const stereo::QualitySettings quality =
       choice.time_budget_s ? WithinBudget(sources.stereo, scene, choice, depth_options,
-                                          writer.work_folder() / "effort.json", progress)
+                                          work / "effort.json", progress)
                            : asked;
   if (!options.normals.empty() && (choice.engine != "patchmatch" || quality.rounds == 0)) {
     throw UsageError(
         "`normals`: expected `engine` patchmatch with one pass or more, whose planes they are of");
   }
-  const auto engine = MakeDepthEngine(choice, quality,
-                                      {views, sources.indices, sources.stereo, &scene,
-                                       set.world_origin, writer.folder(), writer.work_folder()},
-                                      progress);
+  const auto engine = MakeDepthEngine(
+      choice, quality,
+      {views, sources.indices, sources.stereo, &scene, set.world_origin, writer.folder(), work},
+      progress);
   depth_options.neighbours.count = engine->Neighbours();
   // The other half holds photos, and maps that wait for their neighbours to be done.
   depth_options.engine.memory_gb = choice.memory_gb.value_or(kDefaultMemoryGb) / 2;
-  PlaneFiles planes(writer.work_folder() / "planes", HashOf(sources.stereo, scene));
-  EstimateFiles estimates(writer.work_folder() / "estimates");
-  const NormalFiles normals(writer.work_folder(), options.normals);
+  const std::string made_from = HashOf(sources.stereo, scene);
+  PlaneFiles planes(work / "planes", made_from);
+  EstimateFiles estimates(work / "estimates");
+  const NormalFiles normals(work, options.normals);
   depth_options.planes = &planes;
   depth_options.estimates = &estimates;
   ComputeWithin(choice.memory_gb, depth_options, progress, [&] {
@@ -235,18 +248,19 @@ DepthStageResult DepthStage(DtrSet& set, const SparseScene& sparse, const DepthC
           const View& view = view_of(source);
           return view.depth_file.has_value() && normals.Has(view);
         },
-        [&](int source, stereo::DepthEstimate&& estimate, const stereo::DepthRange&) {
+        [&](int source, stereo::DepthEstimate&& estimate, const stereo::DepthRange& range) {
           View& view = view_of(source);
+          if (!options.ranges.empty()) StoreWithin(range, view);
           if (!options.normals.empty()) {
             normals.Write(view, *planes.Load(engine->Rounds(), source), estimate);
           }
           WriteDepth(view, std::move(estimate), set.unit, writer);
         });
   });
-  SetGains(set, scene, writer.folder(), options.threads, progress);
+  if (options.gains) SetGains(set, scene, writer.folder(), options.threads, progress);
   for (const int index : sources.indices) normals.Deliver(views[static_cast<size_t>(index)]);
   if (const std::string codings = SayDepthCodings(views); !codings.empty()) progress.Note(codings);
-  DepthStageResult result{quality, std::nullopt};
+  DepthStageResult result{quality, std::nullopt, made_from};
   if (priors) result.prior = priors->report();
   return result;
 }

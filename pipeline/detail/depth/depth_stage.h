@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "dtr/base/progress.h"
 #include "dtr/io/set_io.h"
@@ -10,6 +12,8 @@
 #include "dtr/types/sparse_scene.h"
 #include "pipeline/depth_settings.h"
 #include "pipeline/detail/depth/depth_priors.h"
+#include "stereo/engine.h"
+#include "stereo/time_step.h"
 
 namespace dtr::pipeline {
 
@@ -20,12 +24,23 @@ struct DepthStageOptions {
   /// gives them; empty: nowhere.
   std::filesystem::path normals = {};
   PhotoCameras photos = {};  ///< of the views, for depth priors; empty: views are their own photos
+  /// Where checkpoints between its steps lie; empty: the writer's work folder.
+  std::filesystem::path work = {};
+  /// Depth ranges of the source views, which then are those of the stored depth, too; empty: from
+  /// the points, widened where they prove too narrow.
+  std::vector<stereo::DepthRange> ranges = {};
+  /// What other time steps say of the source views; empty: nothing.
+  std::vector<stereo::TimeStepSource> time_steps = {};
+  bool gains = true;  ///< the views' gains are estimated
 };
 
 /// What became of the depth stage.
 struct DepthStageResult {
   stereo::QualitySettings quality;  ///< that was asked for or, with a time budget, what fitted
   std::optional<DepthPriorReport> prior;
+  /// What its planes were computed from, for PlaneFiles of `planes` in its work folder: those of
+  /// the last round stay there.
+  std::string planes_made_from;
 };
 
 /// Writes the pixels of a view, or finds them written by an earlier, interrupted run, and frees

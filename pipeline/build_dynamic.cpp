@@ -1,0 +1,250 @@
+#include "pipeline/build_dynamic.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "calib/undistort.h"
+#include "capture/video/frames.h"
+#include "dtr/base/error.h"
+#include "dtr/base/hash.h"
+#include "dtr/base/machine.h"
+#include "dtr/base/parallel_for.h"
+#include "dtr/eval/json.h"
+#include "dtr/io/run_record_json.h"
+#include "dtr/io/set_io.h"
+#include "dtr/io/validation_result.h"
+#include "dtr/render/time_steps.h"
+#include "pipeline/detail/depth/depth_engine.h"
+#include "pipeline/detail/dynamic/fixed_cameras.h"
+#include "pipeline/detail/dynamic/recording.h"
+#include "pipeline/detail/dynamic/step_depth.h"
+#include "pipeline/detail/dynamic/step_progress.h"
+#include "pipeline/detail/pages/set_page.h"
+#include "pipeline/detail/photos/holdout.h"
+#include "pipeline/detail/photos/input_hash.h"
+#include "pipeline/detail/reports/build_json.h"
+#include "pipeline/detail/run/build_options.h"
+#include "pipeline/detail/run/finishing.h"
+#include "pipeline/detail/run/recorded_notes.h"
+#include "pipeline/detail/run/run_log.h"
+#include "pipeline/validate.h"
+
+namespace dtr::pipeline {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+void Reject(bool given, const char* what) {
+  if (given) throw UsageError(std::string("`dynamic`: ") + what);
+}
+
+void RequireDynamicOptions(const BuildOptions& options, const DynamicOptions& dynamic) {
+  Reject(!options.poses.empty(), "holds the cameras of `rig`, or finds them; leave out `poses`");
+  Reject(options.metres.any(),
+         "`gps` and `distance` do not go with it; give `rig`, whose unit holds");
+  Reject(
+      options.holdout_strict,
+      "`holdout_strict` does not go with it; `holdout` names cameras held out at all time steps");
+  Reject(options.depth.prior.given(), "depth priors are of one time step; leave out `depth_prior`");
+  Reject(options.depth.time_budget_s.has_value(),
+         "`time_budget` is for one time step; give `preset`");
+  Reject(!options.depth.workspace.empty() || options.depth.engine == "colmap" ||
+             options.depth.engine == "prior",
+         "expected `engine` patchmatch, sgbm or none");
+  Reject(!options.force_stage.empty(),
+         "`force_stage` does not go with it; delete the partial set to begin again");
+  Reject(options.video.most > 0, "takes every time step; give `every`, `from` and `to`");
+  Reject(options.panoramas == capture::PanoramaUse::kAlways, "panoramas do not go with it");
+  Reject(dynamic.fps && !(*dynamic.fps > 0), "`fps`: expected a positive number");
+}
+
+// Depth over time is for an engine whose planes go from one time step to the next.
+bool IsTemporal(const BuildOptions& options, const DynamicOptions& dynamic,
+                const stereo::QualitySettings& quality) {
+  if (!dynamic.temporal || options.depth.engine == "none") return false;
+  if (options.depth.engine == "patchmatch" && quality.rounds > 0) return true;
+  throw UsageError(
+      "`temporal`: on needs `engine` patchmatch with one pass or more, whose planes go from one "
+      "time step to the next; give `temporal` off");
+}
+
+Json FilesJson(const Recording& recording, const std::filesystem::path& folder) {
+  Json files = Json::array();
+  for (const std::filesystem::path& file : recording.Files()) {
+    files.push_back({{"name", std::filesystem::relative(file, folder).generic_string()},
+                     {"sha256", Sha256OfFile(file)}});
+  }
+  return files;
+}
+
+Json DynamicJson(const Recording& recording, const BuildOptions& options,
+                 const DynamicOptions& dynamic, bool temporal) {
+  Json names = Json::array();
+  for (const RecordedStep& step : recording.steps()) names.push_back(step.name);
+  return {{"cameras", recording.cameras()},
+          {"time_steps", names},
+          {"every", std::max(1, options.video.every)},
+          {"fps", dynamic.fps.value_or(0)},
+          {"temporal", temporal}};
+}
+
+// One camera after the other, so that every video is decoded once: its images on the views' grid.
+void WriteImages(const Recording& recording, const FixedCameras& cameras,
+                 const std::vector<bool>& held_out, const BuildOptions& options, LengthUnit unit,
+                 io::SetWriter& writer, std::vector<Frame>& frames, Progress& progress) {
+  const std::vector<std::string> ids = io::MakeViewIds(recording.cameras());
+  const size_t steps = recording.steps().size();
+  frames.resize(steps);
+  for (size_t step = 0; step < steps; ++step) {
+    frames[step].time_s = recording.steps()[step].time_s - recording.steps().front().time_s;
+    for (size_t c = 0; c < ids.size(); ++c) {
+      View view = ViewOf(cameras, recording, c, held_out, options.max_size_px);
+      view.id = fmt::format("t{:04}_{}", step, ids[c]);
+      frames[step].views.push_back(std::move(view));
+    }
+  }
+  progress.Stage("images of all time steps", static_cast<int>(steps * ids.size()));
+  int done = 0;
+  for (size_t c = 0; c < ids.size(); ++c) {
+    std::vector<bool> restored;
+    for (Frame& frame : frames) restored.push_back(writer.RestoreView(frame.views[c]));
+    done += static_cast<int>(std::count(restored.begin(), restored.end(), true));
+    recording.ForEach(
+        c, [&](size_t step) { return !restored[step]; },
+        [&](size_t step, const ImageRgb8& image) {
+          View& view = frames[step].views[c];
+          const calib::LensCamera& lens = cameras.lens[c];
+          if (image.width() != lens.width_px || image.height() != lens.height_px) {
+            throw Error(fmt::format(
+                "camera {}, time step {}: expected {} x {} px as its other images, found {} x {}",
+                view.name, recording.steps()[step].name, lens.width_px, lens.height_px,
+                image.width(), image.height()));
+          }
+          calib::UndistortedPhoto flat = calib::Undistort(image, {}, lens, lens.Pinhole(),
+                                                          options.max_size_px, options.threads);
+          view.image = std::move(flat.image);
+          view.mask = std::move(flat.mask);
+          writer.WriteView(view, unit);
+          view.image = {};
+          view.mask = {};
+          progress.Update(++done);
+        },
+        progress);
+  }
+}
+
+// What every time step gets once its depth is there.
+void FinishViews(const SparseScene& points, const BuildOptions& options, double memory_gb,
+                 io::SetWriter& writer, DtrSet& set, Progress& progress) {
+  progress.Stage("finishing time steps", static_cast<int>(set.frames.size()));
+  StepProgress quiet(progress);
+  for (size_t step = 0; step < set.frames.size(); ++step) {
+    DtrSet still = TakeStep(set, step);
+    if (options.depth.depth_error_px) {
+      RecodeDepth(still, *options.depth.depth_error_px, writer, options.threads, memory_gb, quiet);
+    }
+    if (options.depth.completion) {
+      CompleteDepth(still, points, writer, options.threads, memory_gb, quiet);
+    }
+    WriteMeshes(still, writer, options.threads, quiet);
+    PutBack(std::move(still), step, set);
+    progress.Update(static_cast<int>(step) + 1);
+    progress.ThrowIfInterrupted();
+  }
+}
+
+}  // namespace
+
+BuildReport BuildDynamicSet(const BuildOptions& asked, const DynamicOptions& dynamic,
+                            Progress& listener) {
+  const BuildOptions options = ByPreset(asked);
+  const stereo::QualitySettings quality = QualityOf(options.depth);
+  RequireDynamicOptions(options, dynamic);
+  RequireEngine(options.depth);
+  const bool temporal = IsTemporal(options, dynamic, quality);
+  const double memory_gb = options.depth.memory_gb.value_or(kDefaultMemoryGb);
+  FixedCameraOptions fixed;
+  if (!options.rig.empty()) fixed.rig = ReadSetRig(options.rig);
+  RequireCalibration({}, {}, options.sfm);
+  io::SetWriter::RequireTarget(options.output, options.force);
+
+  BuildReport report;
+  RunLog log;
+  RecordedNotes progress(listener);
+  log.Begin("capture");
+  const Recording recording(
+      options.photos, {std::max(1, options.video.every), dynamic.from, dynamic.to, dynamic.fps},
+      progress);
+  const std::vector<bool> held_out = ChooseHeldOut(options.holdout, recording.cameras());
+  const Json files = FilesJson(recording, options.photos);
+  const Json dynamic_json = DynamicJson(recording, options, dynamic, temporal);
+  Json fingerprint = {{"tool_version", DTR_VERSION},
+                      {"options", OptionsJson(options, quality)},
+                      {"dynamic", dynamic_json},
+                      {"files", files}};
+  if (!options.rig.empty()) fingerprint["rig_sha256"] = InputHash(options.rig);
+  io::SetWriter writer(options.output, fingerprint.dump(), options.force);
+
+  log.Begin("calibration");
+  fixed.calibrate.held_out = held_out;
+  fixed.calibrate.threads = options.threads;
+  fixed.calibrate.seed = options.seed;
+  fixed.calibrate.memory_gb = memory_gb;
+  fixed.calibrate.refine = options.refine;
+  fixed.calibrate.sfm = options.sfm;
+  fixed.max_size_px = options.max_size_px;
+  const FixedCameras cameras =
+      CalibrateFixedCameras(recording, fixed, writer.work_folder() / "calibration", progress);
+  log.AddEarlier(cameras.calibrated.earlier_wall_s, cameras.calibrated.earlier_cpu_s);
+
+  log.Begin("undistortion");
+  DtrSet set;
+  set.unit = cameras.calibrated.unit;
+  set.world_origin = cameras.calibrated.world_origin;
+  WriteImages(recording, cameras, held_out, options, set.unit, writer, set.frames, progress);
+
+  log.Begin("depth");
+  ComputeStepDepths(set, cameras.all_points,
+                    {options.depth, quality, temporal, options.threads, options.seed}, writer,
+                    progress);
+
+  log.Begin("finishing");
+  FinishViews(cameras.sparse, options, memory_gb, writer, set, progress);
+  Json provenance =
+      ProvenanceJson(options, OptionsJson(options, quality), files, cameras.calibrated, report);
+  provenance["dynamic"] = dynamic_json;
+  set.provenance_json = provenance.dump();
+  writer.WriteSparse(set, cameras.sparse);
+  DtrSet first = AtFrame(set, 0);
+  SetLimits limits;
+  limits.memory_gb = std::min(limits.memory_gb, memory_gb);
+  const SetValidation validation =
+      ValidateSet(writer.folder(), first, cameras.sparse, limits, options.threads, progress);
+  report.validated = true;
+  report.validation_passed = validation.passed();
+  set.validation_json = eval::ValidationJson(validation.tests);
+  if (!report.validation_passed) progress.Note(io::ValidationWarning(set));
+  WriteSetPage(writer, first,
+               {.name = options.output.stem().string(),
+                .engine = options.depth.engine,
+                .checks = validation.tests,
+                .skipped = {},
+                .not_registered = 0,
+                .prior = {},
+                .threads = options.threads},
+               progress);
+  log.End();
+  io::WriteRunRecord(writer.folder(), log.Record(ResolveThreads(options.threads), progress.lines()),
+                     {});
+  writer.Finish(set);
+  report.set = std::move(set);
+  report.written = options.output;
+  report.calibration = cameras.calibrated.report;
+  report.stages = log.stages();
+  report.peak_memory_mib = static_cast<double>(PeakMemoryBytesWithPrograms()) / (1 << 20);
+  return report;
+}
+
+}  // namespace dtr::pipeline

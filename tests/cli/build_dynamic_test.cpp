@@ -1,0 +1,205 @@
+// `dtr build --dynamic` as its users meet it: the toys as fixed cameras saw them.
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <nlohmann/json.hpp>
+
+#include "dtr/base/files.h"
+#include "dtr/base/process.h"
+#include "dtr/io/set_io.h"
+#include "tests/cli/run_dtr.h"
+#include "tests/support/test_data.h"
+
+namespace dtr::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+constexpr int kSteps = 5;
+
+/// Photos of five cameras and a set of them, made once. For reading only.
+class BuildDynamic : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    shared_ = new TemporaryFolder;
+    DtrOk({"dataset", "make", "toys", "-o", At("toys"), "--views", "5", "--steps",
+           std::to_string(kSteps), "--width", "160", "--height", "108", "--noise", "1",
+           "--supersampling", "1"});
+    DtrOk(Build("set.dtr"));
+  }
+  static void TearDownTestSuite() {
+    delete shared_;
+    shared_ = nullptr;
+  }
+  static std::string At(const std::string& name) { return (*shared_ / name).string(); }
+  static std::vector<std::string> Build(const std::string& set,
+                                        const std::vector<std::string>& more = {},
+                                        const std::string& photos = "toys/photos") {
+    std::vector<std::string> words{"build", At(photos), "--dynamic", "--rig", At("toys/rig.json"),
+                                   "-o",    At(set),    "--holdout", "cam02", "--preset",
+                                   "fast",  "--rounds", "1"};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+
+  inline static TemporaryFolder* shared_ = nullptr;
+};
+
+TEST_F(BuildDynamic, HasAFrameForEachTimeStepAndItsCamerasStandStill) {
+  const DtrSet set = io::LoadSet(At("set.dtr"), {.held_out = true});
+  ASSERT_EQ(set.frames.size(), static_cast<size_t>(kSteps));
+  for (size_t step = 0; step < set.frames.size(); ++step) {
+    ASSERT_EQ(set.frames[step].views.size(), 5u);
+    for (size_t c = 0; c < 5; ++c) {
+      const View &view = set.frames[step].views[c], &first = set.frames[0].views[c];
+      EXPECT_EQ(view.name, "cam0" + std::to_string(c));
+      EXPECT_EQ(view.id, "t000" + std::to_string(step) + "_cam0" + std::to_string(c));
+      EXPECT_EQ(view.cam_from_world.translation, first.cam_from_world.translation);
+      EXPECT_EQ(view.reference_baseline, first.reference_baseline);
+      EXPECT_EQ(view.role, c == 2 ? ViewRole::kHeldOut : ViewRole::kSource);
+      EXPECT_EQ(view.depth.empty(), c == 2);
+    }
+  }
+  EXPECT_EQ(set.unit, LengthUnit::kMetre);
+  // At ten time steps per second, which photos do not say: 24.
+  EXPECT_DOUBLE_EQ(set.frames[1].time_s, 1.0 / 24);
+  EXPECT_EQ(DtrOk({"info", At("set.dtr"), "--verify"}).code, 0);
+}
+
+TEST_F(BuildDynamic, WhatStandsStillKeepsOneDepth) {
+  const DtrSet set = io::LoadSet(At("set.dtr"));
+  long same = 0, all = 0;
+  for (size_t c = 0; c < set.frames[0].views.size(); ++c) {
+    const DepthImage& first = set.frames[0].views[c].depth;
+    const DepthImage& last = set.frames[kSteps - 1].views[c].depth;
+    for (size_t i = 0; i < first.grid().data().size(); ++i) {
+      if (DepthImage::IsHole(first.grid().data()[i])) continue;
+      ++all;
+      same += first.grid().data()[i] == last.grid().data()[i];
+    }
+  }
+  // The toys with their shadows and what matching them reaches: less than a third of the images.
+  EXPECT_GT(static_cast<double>(same) / static_cast<double>(all), 0.67);
+  EXPECT_LT(same, all);
+}
+
+TEST_F(BuildDynamic, IsMeasuredAgainstTruthAndHeldOutCamerasOverTime) {
+  const Json json = Json::parse(DtrOk({"evaluate", At("set.dtr"), "--renderer", "cpu", "--depth",
+                                       At("toys/truth"), "--json", "-"})
+                                    .out);
+  EXPECT_EQ(json["time_steps"], kSteps);
+  ASSERT_EQ(json["views"].size(), 1u);
+  EXPECT_EQ(json["views"][0]["name"], "cam02");
+  EXPECT_GT(json["views"][0]["psnr_db"], 18);
+  EXPECT_GT(json["depth"]["share_within_2pct"], 0.5);
+  EXPECT_GT(json["flicker"]["pixels"], 1000);
+  EXPECT_LT(json["flicker"]["median_relative_deviation"], 1e-6);
+}
+
+TEST_F(BuildDynamic, VideosGiveTheSameSetAsPhotos) {
+  if (FindProgram("ffmpeg").empty()) GTEST_SKIP() << "SKIPPED: no program ffmpeg";
+  DtrOk({"dataset", "make", "toys", "-o", At("filmed"), "--views", "5", "--steps",
+         std::to_string(kSteps), "--width", "160", "--height", "108", "--noise", "1",
+         "--supersampling", "1", "--videos"});
+  DtrOk(Build("filmed.dtr", {"--fps", "24"}, "filmed/videos"));
+  const DtrSet photos = io::LoadSet(At("set.dtr")), videos = io::LoadSet(At("filmed.dtr"));
+  ASSERT_EQ(videos.frames.size(), photos.frames.size());
+  for (size_t step = 0; step < photos.frames.size(); ++step) {
+    for (size_t c = 0; c < photos.frames[step].views.size(); ++c) {
+      EXPECT_EQ(videos.frames[step].views[c].image, photos.frames[step].views[c].image);
+      EXPECT_EQ(videos.frames[step].views[c].depth.grid(),
+                photos.frames[step].views[c].depth.grid());
+    }
+  }
+}
+
+TEST_F(BuildDynamic, GoesOnWhereItWasInterruptedToTheSameBytes) {
+  const fs::path partial = At("again.dtr") + ".partial";
+  const Ran stopped =
+      Dtr(Build("again.dtr"), {SIGTERM, [&] {
+                                 return fs::exists(partial / "depth/t0001_cam01.png") ||
+                                        fs::exists(partial / "depth/t0001_cam01.exr");
+                               }});
+  EXPECT_NE(stopped.code, 0);
+  EXPECT_FALSE(fs::exists(At("again.dtr")));
+  DtrOk(Build("again.dtr"));
+  EXPECT_EQ(DifferingFiles(Contents(At("set.dtr")), Contents(At("again.dtr"))),
+            std::vector<std::string>());
+}
+
+TEST_F(BuildDynamic, DoesNotDependOnThreads) {
+  DtrOk(Build("one.dtr", {"--threads", "1"}));
+  EXPECT_EQ(DifferingFiles(Contents(At("set.dtr")), Contents(At("one.dtr"))),
+            std::vector<std::string>());
+}
+
+TEST_F(BuildDynamic, TakesTheTimeStepsThatAreChosen) {
+  DtrOk(Build("some.dtr", {"--from", "1", "--to", "3", "--every", "2", "--engine", "none"}));
+  const DtrSet set = io::ReadSet(At("some.dtr"));
+  ASSERT_EQ(set.frames.size(), 2u);
+  EXPECT_EQ(set.frames[0].time_s, 0);
+  EXPECT_DOUBLE_EQ(set.frames[1].time_s, 2.0 / 24);
+}
+
+TEST_F(BuildDynamic, TruthOfEveryTimeStepIsNeeded) {
+  ExpectRejected(Dtr({"evaluate", At("set.dtr"), "--renderer", "cpu", "--depth", At("nothing")}),
+                 kWrongUsage,
+                 "expected a folder with one folder of truth for each time step, found nothing");
+  fs::create_directories(At("half/0000"));
+  ExpectRejected(Dtr({"evaluate", At("set.dtr"), "--renderer", "cpu", "--depth", At("half")}),
+                 kWrongUsage, "expected a folder of truth for time step 1, 0001");
+}
+
+TEST_F(BuildDynamic, NoTimeStepOfAllCamerasIsAnError) {
+  const auto copy = [&](const std::string& from, const std::string& to) {
+    fs::create_directories(fs::path(At(to)).parent_path());
+    fs::copy_file(At("toys/photos/" + from), At(to));
+  };
+  copy("cam00/0000.png", "apart/cam00/0000.png");
+  copy("cam01/0001.png", "apart/cam01/0001.png");
+  ExpectRejected(Dtr(Build("none.dtr", {"--holdout", ""}, "apart")), kFailed,
+                 "expected time steps with an image of each of the 2 cameras, found none");
+}
+
+TEST_F(BuildDynamic, CamerasOfAnotherSizeAreNamed) {
+  DtrOk({"dataset", "make", "toys", "-o", At("small"), "--views", "3", "--steps", "3", "--width",
+         "80", "--height", "54", "--supersampling", "1"});
+  ExpectRejected(Dtr(Build("none.dtr", {"--holdout", ""}, "small/photos")), kFailed,
+                 "camera cam00: expected 160 x 108 px as it was calibrated with, found 80 x 54");
+  // The first time step fits, a later one does not.
+  for (const std::string camera : {"cam00", "cam01", "cam02", "cam03", "cam04"}) {
+    for (const std::string step : {"0000.png", "0001.png", "0002.png"}) {
+      fs::create_directories(At("mixed/" + camera));
+      fs::copy_file(At("toys/photos/" + camera + "/" + step), At("mixed/" + camera + "/" + step));
+    }
+  }
+  fs::copy_file(At("small/photos/cam00/0002.png"), At("mixed/cam00/0002.png"),
+                fs::copy_options::overwrite_existing);
+  ExpectRejected(Dtr(Build("mixed.dtr", {}, "mixed")), kFailed,
+                 "camera cam00, time step 0002: expected 160 x 108 px as its other images, found "
+                 "80 x 54");
+}
+
+TEST_F(BuildDynamic, RejectsWhatDoesNotGoTogether) {
+  const auto rejected = [&](const std::vector<std::string>& more, int code,
+                            const std::string& text) {
+    ExpectRejected(Dtr(Build("none.dtr", more)), code, text);
+    EXPECT_FALSE(fs::exists(At("none.dtr.partial")));
+  };
+  rejected({"--to", "9"}, kWrongUsage, "expected 0 <= from <= to <= 4");
+  rejected({"--engine", "sgbm"}, kWrongUsage, "needs --engine patchmatch");
+  rejected({"--poses", At("toys/rig.json")}, kWrongUsage,
+           "holds the cameras of --rig, or finds them");
+  ExpectRejected(Dtr({"build", At("toys/photos/cam00"), "--dynamic", "-o", At("none.dtr")}),
+                 kWrongUsage, "expected at least 2 cameras");
+  fs::create_directories(At("other"));
+  fs::create_directory_symlink(At("toys/photos/cam00"), At("other/cam00"));
+  fs::create_directory_symlink(At("toys/photos/cam01"), At("other/left"));
+  ExpectRejected(Dtr(Build("none.dtr", {"--holdout", ""}, "other")), kFailed,
+                 "camera left: expected one of its cameras");
+  EXPECT_FALSE(fs::exists(At("none.dtr")));
+}
+
+}  // namespace
+}  // namespace dtr::testing
