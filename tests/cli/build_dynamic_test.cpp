@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-constexpr int kSteps = 5;
+constexpr int kSteps = 4;
 
 /// Photos of five cameras and a set of them, made once. For reading only.
 class BuildDynamic : public ::testing::Test {
@@ -36,9 +36,10 @@ class BuildDynamic : public ::testing::Test {
   static std::vector<std::string> Build(const std::string& set,
                                         const std::vector<std::string>& more = {},
                                         const std::string& photos = "toys/photos") {
-    std::vector<std::string> words{"build", At(photos), "--dynamic", "--rig", At("toys/rig.json"),
-                                   "-o",    At(set),    "--holdout", "cam02", "--preset",
-                                   "fast",  "--rounds", "1"};
+    std::vector<std::string> words{
+        "build", At(photos), "--dynamic", "--rig",          At("toys/rig.json"),
+        "-o",    At(set),    "--holdout", "cam02",          "--preset",
+        "fast",  "--rounds", "1",         "--no-completion"};
     words.insert(words.end(), more.begin(), more.end());
     return words;
   }
@@ -114,6 +115,19 @@ TEST_F(BuildDynamic, VideosGiveTheSameSetAsPhotos) {
   }
 }
 
+TEST_F(BuildDynamic, VideosOfDifferentRatesAreRejected) {
+  if (FindProgram("ffmpeg").empty()) GTEST_SKIP() << "SKIPPED: no program ffmpeg";
+  fs::create_directories(At("rates"));
+  for (const std::string fps : {"10", "12"}) {
+    DtrOk({"dataset", "make", "toys", "-o", At("at" + fps), "--views", "2", "--steps", "3",
+           "--width", "48", "--height", "32", "--supersampling", "1", "--videos", "--fps", fps});
+    const std::string camera = fps == "10" ? "cam00.mkv" : "cam01.mkv";
+    fs::copy_file(At("at" + fps + "/videos/" + camera), At("rates/" + camera));
+  }
+  ExpectRejected(Dtr({"build", At("rates"), "--dynamic", "-o", At("none.dtr")}), kFailed,
+                 "expected videos of one rate, as frames are not resampled");
+}
+
 TEST_F(BuildDynamic, GoesOnWhereItWasInterruptedToTheSameBytes) {
   const fs::path partial = At("again.dtr") + ".partial";
   const Ran stopped =
@@ -187,7 +201,7 @@ TEST_F(BuildDynamic, RejectsWhatDoesNotGoTogether) {
     ExpectRejected(Dtr(Build("none.dtr", more)), code, text);
     EXPECT_FALSE(fs::exists(At("none.dtr.partial")));
   };
-  rejected({"--to", "9"}, kWrongUsage, "expected 0 <= from <= to <= 4");
+  rejected({"--to", "9"}, kWrongUsage, "expected 0 <= from <= to <= 3");
   rejected({"--engine", "sgbm"}, kWrongUsage, "needs --engine patchmatch");
   rejected({"--poses", At("toys/rig.json")}, kWrongUsage,
            "holds the cameras of --rig, or finds them");

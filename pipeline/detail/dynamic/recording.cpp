@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 
@@ -33,6 +34,23 @@ double StepsPerSecond(const RigLayout& layout, const StepChoice& choice) {
   if (first.number < 0) return kPhotosPerSecond;
   const double rate = capture::VideoReader(first.file).frames_per_second();
   return rate > 0 ? rate : kPhotosPerSecond;
+}
+
+// Frames of equal number are of one time only where all videos run at one rate.
+void RequireOneRate(const fs::path& folder, const RigLayout& layout) {
+  constexpr double kSameRate = 1e-3;  // relative: 29.97 and 30 differ by as much
+  if (layout.shots.front().number < 0 || fs::exists(folder / "timestamps.csv")) return;
+  std::map<fs::path, double> rates;
+  for (const RigShot& shot : layout.shots) rates.emplace(shot.file, 0);
+  for (auto& [file, rate] : rates) rate = capture::VideoReader(file).frames_per_second();
+  const auto& [first_file, first_rate] = *rates.begin();
+  for (const auto& [file, rate] : rates) {
+    if (std::abs(rate - first_rate) < kSameRate * first_rate) continue;
+    throw Error(fmt::format(
+        "{}: {:.3f} frames per second, {}: {:.3f}; expected videos of one rate, as frames are not "
+        "resampled, or timestamps.csv, which states the frames of each time step",
+        first_file.string(), first_rate, file.string(), rate));
+  }
 }
 
 // The time steps that all cameras have.
@@ -95,6 +113,7 @@ Recording::Recording(const fs::path& folder, const StepChoice& choice, Progress&
   for (const auto& left_out : layout_.left_out) {
     progress.Note(left_out.name + ": " + left_out.reason);
   }
+  RequireOneRate(folder, layout_);
   steps_ = Chosen(WholeSteps(folder, layout_, StepsPerSecond(layout_, choice), progress), choice);
 }
 
