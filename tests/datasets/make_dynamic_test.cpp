@@ -30,14 +30,14 @@ DatasetSpec Toys() {
   return spec;
 }
 
-void Make(const DatasetSpec& spec, const fs::path& folder) {
+void MakeSteps(const DatasetSpec& spec, const fs::path& folder) {
   SilentProgress progress;
   MakeDataset(spec, folder, 2, progress);
 }
 
 TEST(MakeDynamicDataset, WritesPhotosRigAndTruthOfEveryTimeStep) {
   const testing::TemporaryFolder folder;
-  Make(Toys(), folder / "toys");
+  MakeSteps(Toys(), folder / "toys");
   for (const std::string step : {"0000", "0001", "0002"}) {
     for (const std::string camera : {"cam00", "cam01", "cam02"}) {
       EXPECT_TRUE(fs::exists(folder / "toys/photos" / camera / (step + ".png")));
@@ -56,7 +56,7 @@ TEST(MakeDynamicDataset, WritesPhotosRigAndTruthOfEveryTimeStep) {
 
 TEST(MakeDynamicDataset, SomeDepthMovesAndMostStays) {
   const testing::TemporaryFolder folder;
-  Make(Toys(), folder / "toys");
+  MakeSteps(Toys(), folder / "toys");
   const auto depth = [&](const std::string& step) {
     return io::ReadFloatGrid(folder / "toys/truth" / step / "depth/cam01.exr");
   };
@@ -73,9 +73,9 @@ TEST(MakeDynamicDataset, VideosReadBackToThePhotosBitForBit) {
   const testing::TemporaryFolder folder;
   DatasetSpec spec = Toys();
   spec.noise = 2;
-  Make(spec, folder / "photos");
+  MakeSteps(spec, folder / "photos");
   spec.videos = true;
-  Make(spec, folder / "videos");
+  MakeSteps(spec, folder / "videos");
   int frames = 0;
   capture::ForEachFrame(
       folder / "videos/videos/cam02.mkv", [&](int number, const ImageRgb8& image) {
@@ -93,14 +93,14 @@ TEST(MakeDynamicDataset, RejectsWhatDoesNotMoveOrGoWithTimeSteps) {
   const testing::TemporaryFolder folder;
   DatasetSpec still = Toys();
   still.scene = "plane";
-  EXPECT_THROW(Make(still, folder / "plane"), UsageError);
+  EXPECT_THROW(MakeSteps(still, folder / "plane"), UsageError);
   DatasetSpec lens = Toys();
   lens.k1 = 0.01;
-  EXPECT_THROW(Make(lens, folder / "lens"), UsageError);
+  EXPECT_THROW(MakeSteps(lens, folder / "lens"), UsageError);
   DatasetSpec sphere = Toys();
   sphere.scene = "sphere";
   sphere.steps = 100;  // ten seconds: the ball is gone after one
-  EXPECT_THROW(Make(sphere, folder / "sphere"), UsageError);
+  EXPECT_THROW(MakeSteps(sphere, folder / "sphere"), UsageError);
   EXPECT_TRUE(fs::is_empty(folder / "."));
 }
 

@@ -47,10 +47,13 @@ std::vector<ImageRgb8> Walls(double noise, std::uint64_t seed) {
 TEST(Background, NoiseIsThatOfTheImagesWhateverMoves) {
   for (const double noise : {0.7, 1.5, 4.0}) {
     const auto images = Walls(noise, 3);
-    // Rounding to whole levels adds 1/12 to the variance. 5 %: the median of 30 000 blocks is
-    // sure to 1 %, and what moves makes it larger by up to 4 %.
+    // Rounding to whole levels adds 1/12 to the variance. Of two images, 160 of 2560 pixels are in
+    // blocks that the square leaves or reaches: the median is at most the 0.533 quantile of those
+    // that stand still, which is 1.08 times the median. That of 7000 blocks is sure to 1 %.
     const double expected = std::sqrt(noise * noise + 1.0 / 12);
-    EXPECT_NEAR(NoiseOverTime({images, {}}, 2), expected, 0.05 * expected) << noise;
+    const double found = NoiseOverTime({images, {}}, 2);
+    EXPECT_GT(found, 0.98 * expected) << noise;
+    EXPECT_LT(found, 1.10 * expected) << noise;
   }
 }
 
