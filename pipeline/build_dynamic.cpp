@@ -178,6 +178,7 @@ BuildReport BuildDynamicSet(const BuildOptions& asked, const DynamicOptions& dyn
       options.photos, {std::max(1, options.video.every), dynamic.from, dynamic.to, dynamic.fps},
       progress);
   const std::vector<bool> held_out = ChooseHeldOut(options.holdout, recording.cameras());
+  if (fixed.rig) RequireRigCameras(*fixed.rig, recording, progress);
   const Json files = FilesJson(recording, options.photos);
   const Json dynamic_json = DynamicJson(recording, options, dynamic, temporal);
   Json fingerprint = {{"tool_version", DTR_VERSION},

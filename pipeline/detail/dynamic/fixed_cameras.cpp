@@ -40,31 +40,6 @@ capture::Capture PhotosOfStep(const Recording& recording, size_t step, const fs:
                                progress);
 }
 
-void RequireRigCameras(const SetRig& rig, const Recording& recording,
-                       const capture::Capture& photos) {
-  for (const std::string& camera : recording.cameras()) {
-    const auto found = std::find(rig.names.begin(), rig.names.end(), camera);
-    if (found == rig.names.end()) {
-      std::string known;
-      for (const std::string& name : rig.names) known += (known.empty() ? "" : ", ") + name;
-      throw Error(fmt::format(
-          "`rig` {}: camera {}: expected one of its cameras ({}); name videos or folders of photos "
-          "as the rig does, or move it out of the folder",
-          rig.file, camera, known));
-    }
-    const auto& lens = rig.known.lenses[static_cast<size_t>(found - rig.names.begin())];
-    const auto photo = std::find_if(photos.photos.begin(), photos.photos.end(),
-                                    [&](const auto& p) { return p.name == PhotoName(camera); });
-    if (photo == photos.photos.end() ||
-        (photo->width_px == lens.width_px && photo->height_px == lens.height_px)) {
-      continue;
-    }
-    throw Error(fmt::format(
-        "`rig` {}: camera {}: expected {} x {} px as it was calibrated with, found {} x {}",
-        rig.file, camera, lens.width_px, lens.height_px, photo->width_px, photo->height_px));
-  }
-}
-
 // Options for the photos of one time step, whose order is that of their file names.
 CalibrateOptions OptionsFor(const capture::Capture& photos, const Recording& recording,
                             const CalibrateOptions& options) {
@@ -110,7 +85,6 @@ CalibratedPhotos FirstStep(const Recording& recording, const FixedCameraOptions&
   const CalibrateOptions calibrate = OptionsFor(photos, recording, options.calibrate);
   if (!options.rig) return CalibratePhotos(photos, calibrate, workspace / "sfm0", progress);
   const SetRig& rig = *options.rig;
-  RequireRigCameras(rig, recording, photos);
   std::vector<calib::LensCamera> lenses;
   std::vector<Pose> poses;
   for (const std::string& camera : recording.cameras()) {
@@ -167,6 +141,31 @@ void Append(const SparseScene& more, SparseScene& scene) {
 }
 
 }  // namespace
+
+void RequireRigCameras(const SetRig& rig, const Recording& recording, const Progress& progress) {
+  for (size_t c = 0; c < recording.cameras().size(); ++c) {
+    const std::string& camera = recording.cameras()[c];
+    const auto found = std::find(rig.names.begin(), rig.names.end(), camera);
+    if (found == rig.names.end()) {
+      std::string known;
+      for (const std::string& name : rig.names) known += (known.empty() ? "" : ", ") + name;
+      throw Error(fmt::format(
+          "`rig` {}: camera {}: expected one of its cameras ({}); name videos or folders of photos "
+          "as the rig does, or move it out of the folder",
+          rig.file, camera, known));
+    }
+    const auto& lens = rig.known.lenses[static_cast<size_t>(found - rig.names.begin())];
+    recording.ForEach(
+        c, [](size_t step) { return step == 0; },
+        [&](size_t, const ImageRgb8& image) {
+          if (image.width() == lens.width_px && image.height() == lens.height_px) return;
+          throw Error(fmt::format(
+              "`rig` {}: camera {}: expected {} x {} px as it was calibrated with, found {} x {}",
+              rig.file, camera, lens.width_px, lens.height_px, image.width(), image.height()));
+        },
+        progress);
+  }
+}
 
 FixedCameras CalibrateFixedCameras(const Recording& recording, const FixedCameraOptions& options,
                                    const fs::path& workspace, Progress& progress) {

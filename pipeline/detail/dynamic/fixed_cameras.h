@@ -29,11 +29,15 @@ struct FixedCameraOptions {
   int max_size_px = 0;         ///< of the views, whose grid the points are on
 };
 
-/// Cameras of a rig as they were calibrated, or as structure from motion finds them in the images
-/// of one time step (which moving things do not disturb: it is one moment), and points of the
-/// first, middle and last time step with these cameras held. A later time step without points adds
-/// none, with a note. Throws Error naming a camera that the rig does not have, that has another
-/// size there, or that structure from motion did not find.
+/// Throws Error naming a camera that the rig does not have, or that has another size there, by the
+/// images of the first time step: before any work, so that the corrected command finds none.
+void RequireRigCameras(const SetRig& rig, const Recording& recording, const Progress& progress);
+
+/// Requires RequireRigCameras. Cameras of a rig as they were calibrated, or as structure from
+/// motion finds them in the images of one time step (which moving things do not disturb: it is one
+/// moment), and points of the first, middle and last time step with these cameras held. A later
+/// time step without points adds none, with a note. Throws Error naming a camera that structure
+/// from motion did not find.
 FixedCameras CalibrateFixedCameras(const Recording& recording, const FixedCameraOptions& options,
                                    const std::filesystem::path& workspace, Progress& progress);
 
