@@ -40,8 +40,9 @@ if(NOT output MATCHES "cloud.ply: 3[0-9][0-9][0-9] points")
   message(FATAL_ERROR "point_cloud: expected a point for every pixel of 64 x 48, found\n${output}")
 endif()
 if(PYTHON)
+  # Lines, as a semicolon would make two arguments of it.
   run(${CMAKE_COMMAND} -E env PYTHONPATH=${prefix}/${PYTHON_DIR} PYTHONDONTWRITEBYTECODE=1 ${PYTHON} -c
-    "import dtr, sys; s = dtr.load(sys.argv[1]); print(dtr.__file__, s.views[0].depth.shape)" ${WORK}/plane.dtr)
+    "import dtr, sys\ns = dtr.load(sys.argv[1])\nprint(dtr.__file__, s.views[0].depth.shape)" ${WORK}/plane.dtr)
   if(NOT output MATCHES "${prefix}/${PYTHON_DIR}/dtr/__init__.py .48, 64.")
     message(FATAL_ERROR "python: expected the installed package and depth of 48 x 64, found\n${output}")
   endif()
