@@ -11,6 +11,7 @@
 #include "dtr/base/hash.h"
 #include "dtr/base/machine.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/base/quiet_progress.h"
 #include "dtr/eval/json.h"
 #include "dtr/io/run_record_json.h"
 #include "dtr/io/set_io.h"
@@ -20,7 +21,6 @@
 #include "pipeline/detail/dynamic/fixed_cameras.h"
 #include "pipeline/detail/dynamic/recording.h"
 #include "pipeline/detail/dynamic/step_depth.h"
-#include "pipeline/detail/dynamic/step_progress.h"
 #include "pipeline/detail/pages/set_page.h"
 #include "pipeline/detail/photos/holdout.h"
 #include "pipeline/detail/photos/input_hash.h"
@@ -139,7 +139,7 @@ void WriteImages(const Recording& recording, const FixedCameras& cameras,
 void FinishViews(const SparseScene& points, const BuildOptions& options, double memory_gb,
                  io::SetWriter& writer, DtrSet& set, Progress& progress) {
   progress.Stage("finishing time steps", static_cast<int>(set.frames.size()));
-  StepProgress quiet(progress);
+  QuietProgress quiet(progress);
   for (size_t step = 0; step < set.frames.size(); ++step) {
     DtrSet still = TakeStep(set, step);
     if (options.depth.depth_error_px) {

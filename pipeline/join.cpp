@@ -11,6 +11,7 @@
 #include "dtr/base/hash.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/view_stream.h"
+#include "dtr/types/widen_bounds.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -62,16 +63,6 @@ void MoveTo(const Eigen::Vector3d& origin, DtrSet& set) {
   set.bounds.min -= shift;
   set.bounds.max -= shift;
   set.world_origin = origin;
-}
-
-void Widen(const Bounds& other, Bounds& bounds) {
-  if (other.empty()) return;
-  if (bounds.empty()) {
-    bounds = other;
-    return;
-  }
-  bounds.min = bounds.min.cwiseMin(other.min);
-  bounds.max = bounds.max.cwiseMax(other.max);
 }
 
 void WriteViews(const fs::path& folder, size_t index, Frame& frame, LengthUnit unit,

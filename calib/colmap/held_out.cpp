@@ -19,6 +19,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/base/quiet_progress.h"
 #include "dtr/io/image_io.h"
 
 namespace dtr::colmap {
@@ -175,20 +176,6 @@ void RegisterHere(Workspace& workspace, const Frozen& frozen, SmallSources& smal
   model.images.push_back(std::move(registered->image));
   WriteModel(output, model, Format::kBinary);
 }
-
-// Lets a photo's programs be stopped, but keeps their stages to itself.
-class QuietProgress final : public Progress {
- public:
-  explicit QuietProgress(const Progress& outer) : outer_(outer) {}
-  void Stage(const std::string&, int) override {}
-  void Update(int) override {}
-  void Note(const std::string&) override {}
-  bool StopRequested() const override { return outer_.StopRequested(); }
-  std::string InterruptedLine() const override { return outer_.InterruptedLine(); }
-
- private:
-  const Progress& outer_;
-};
 
 struct Placed {
   std::optional<calib::SfmImage> image;

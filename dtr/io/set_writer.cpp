@@ -1,9 +1,7 @@
 // The writing half of set_io.h.
 #include <algorithm>
-#include <map>
 #include <set>
 #include <stdexcept>
-#include <utility>
 
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
@@ -15,6 +13,7 @@
 #include "dtr/io/mesh_io.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/set_json.h"
+#include "dtr/io/shared_files.h"
 #include "dtr/io/sparse_io.h"
 
 namespace dtr::io {
@@ -106,23 +105,6 @@ auto AsError(const Function& function) {
     return function();
   } catch (const fs::filesystem_error& error) {
     throw Error(std::string("set cannot be written: ") + error.what());
-  }
-}
-
-// What is the same at several time steps is stored once: all its views name the first one's file.
-void ShareEqualFiles(DtrSet& set) {
-  std::map<std::pair<std::string, std::uint64_t>, std::string> path_of;
-  for (Frame& frame : set.frames) {
-    for (View& view : frame.views) {
-      if (view.role != ViewRole::kSource) continue;  // those of held-out views have no hash here
-      for (auto* file : {&view.image_file, &view.mask_file, &view.depth_file, &view.completed_file,
-                         &view.sigma_file, &view.mesh_file}) {
-        if (!*file) continue;
-        const auto first =
-            path_of.emplace(std::pair((*file)->sha256, (*file)->bytes), (*file)->path);
-        (*file)->path = first.first->second;
-      }
-    }
   }
 }
 

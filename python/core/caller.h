@@ -95,7 +95,7 @@ class Caller final : public Progress {
   std::mutex mutex_;
   std::string stage_;
   int total_ = 0;
-  std::chrono::steady_clock::time_point next_;  // when progress is told again
+  std::chrono::steady_clock::time_point next_;  // when progress is reported next
   std::atomic<bool> stopped_ = false;
   std::optional<py::error_already_set> raised_;  // with Python's lock
 };

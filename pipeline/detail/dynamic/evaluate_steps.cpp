@@ -9,12 +9,12 @@
 #include <vector>
 
 #include "dtr/base/error.h"
+#include "dtr/base/quiet_progress.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/time_steps.h"
 #include "pipeline/detail/boards/rig_names.h"
 #include "pipeline/detail/boards/rig_timestamps.h"
-#include "pipeline/detail/dynamic/step_progress.h"
 #include "pipeline/evaluate_depth.h"
 
 namespace dtr::pipeline {
@@ -158,7 +158,7 @@ EvaluateResult EvaluateSteps(const EvaluateRequest& request, const DtrSet& descr
   DepthScorers scorers;
   std::map<std::string, eval::ViewFlicker> flicker;
   progress.Stage("evaluating time steps", static_cast<int>(described.frames.size()));
-  StepProgress quiet(progress);
+  QuietProgress quiet(progress);
   for (size_t step = 0; step < described.frames.size(); ++step) {
     progress.ThrowIfInterrupted();
     const DtrSet set = LoadedStep(request, described, step, progress);

@@ -10,11 +10,12 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/memory_budget.h"
+#include "dtr/base/quiet_progress.h"
+#include "dtr/types/widen_bounds.h"
 #include "pipeline/detail/depth/depth_stage.h"
 #include "pipeline/detail/depth/plane_files.h"
 #include "pipeline/detail/depth/source_scene.h"
 #include "pipeline/detail/dynamic/background_views.h"
-#include "pipeline/detail/dynamic/step_progress.h"
 #include "pipeline/detail/run/finishing.h"
 #include "stereo/depth_range.h"
 #include "stereo/pages.h"
@@ -157,7 +158,7 @@ class TemporalDepth {
     stage.time_steps = reader.Sources();
     stage.gains = false;
     DtrSet still = TakeStep(set_, step);
-    StepProgress quiet(progress_);
+    QuietProgress quiet(progress_);
     DepthStage(still, scene_, options_.depth, options_.quality, stage, writer_, quiet);
     PutBack(std::move(still), step, set_);
     // The planes of the time step before are needed until this one is whole.
@@ -201,22 +202,12 @@ void ComputeAlone(DtrSet& set, const SparseScene& points, const StepDepthOptions
     stage.seed = options.seed;
     stage.work = writer.work_folder() / fmt::format("alone{:04}", step);
     DtrSet still = TakeStep(set, step);
-    StepProgress quiet(progress);
+    QuietProgress quiet(progress);
     DepthStage(still, points, options.depth, options.quality, stage, writer, quiet);
     PutBack(std::move(still), step, set);
     fs::remove_all(stage.work);
     progress.Update(static_cast<int>(step) + 1);
   }
-}
-
-void Widen(const Bounds& other, Bounds& bounds) {
-  if (other.empty()) return;
-  if (bounds.empty()) {
-    bounds = other;
-    return;
-  }
-  bounds.min = bounds.min.cwiseMin(other.min);
-  bounds.max = bounds.max.cwiseMax(other.max);
 }
 
 // The same centre and baselines at all time steps, those of the first; a box around all of some.
