@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <nlohmann/json.hpp>
 
 #include "calib/sparse_from_sfm.h"
@@ -30,8 +31,10 @@
 #include "pipeline/detail/photos/undistort_photos.h"
 #include "pipeline/detail/reports/build_json.h"
 #include "pipeline/detail/run/build_options.h"
+#include "pipeline/detail/run/build_share.h"
 #include "pipeline/detail/run/finishing.h"
 #include "pipeline/detail/run/force_stage.h"
+#include "pipeline/detail/run/part_files.h"
 #include "pipeline/detail/run/recorded_notes.h"
 #include "pipeline/detail/run/run_log.h"
 #include "pipeline/model_grid.h"
@@ -120,9 +123,14 @@ std::vector<bool> HeldOutOf(const std::string& spec, const capture::Capture& pho
 // The frames of a video, chosen once, and the views of panoramas: a later run of the same build
 // finds them in `folder`.
 capture::Capture FramesOf(const BuildOptions& options, const std::filesystem::path& folder,
-                          Progress& progress) {
+                          bool is_shared, Progress& progress) {
   const std::filesystem::path kept = folder / "capture", fresh = folder / "frames";
   if (!std::filesystem::exists(kept / capture::kCaptureFile)) {
+    if (is_shared) {
+      throw Error(kept.string() +
+                  ": expected the frames that the stage `capture` chooses, found none; run that "
+                  "stage first");
+    }
     capture::VideoOptions video = options.video;
     video.threads = options.threads;
     video.memory_gb = options.depth.memory_gb.value_or(kDefaultMemoryGb);
@@ -243,10 +251,35 @@ void SayRemarks(const BuildReport& report, size_t photos, Progress& progress) {
                   report.screening.size(), photos, name, remarks.front()));
 }
 
-}  // namespace
+// What other processes did of these stages counts as an earlier run's work.
+void AddParts(const std::filesystem::path& work, const std::vector<std::string>& stages,
+              RunLog& log) {
+  const DonePart total = TotalOf(work, stages);
+  log.AddEarlier(total.wall_s, total.cpu_s);
+}
 
-BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
-  const BuildOptions options = ByPreset(asked);
+// Cameras: worked out, or, for what comes after them, as they were frozen.
+CalibratedPhotos CamerasOf(const capture::Capture& photos, const CalibrateOptions& calibrate,
+                           const BuildShare& share, const std::filesystem::path& work,
+                           Progress& progress) {
+  if (share.is_shared() && !calibrate.part) return FrozenCalibration(work);
+  CalibratedPhotos calibrated = CalibratePhotos(photos, calibrate, work / "calibration", progress);
+  if (share.Is("calibration")) FreezeCalibration(calibrated, work);
+  share.EndAfter("calibration");
+  return calibrated;
+}
+
+// A process with a part of depth needs the images of all views.
+void RequireImages(std::vector<View>& views, const io::SetWriter& writer) {
+  for (View& view : views) {
+    if (view.image_file || writer.RestoreView(view)) continue;
+    throw Error(view.name +
+                ": expected its undistorted image, found none; run all parts of the stage "
+                "`undistortion` first");
+  }
+}
+
+BuildReport BuildOrPart(const BuildOptions& options, Progress& listener) {
   const stereo::QualitySettings quality = QualityOf(options.depth);
   RequireEngine(options.depth);
   RequireOptions(options);
@@ -254,6 +287,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   if (!options.rig.empty()) rig = ReadSetRig(options.rig);
   const double memory_gb = options.depth.memory_gb.value_or(kDefaultMemoryGb);
   BuildReport report;
+  BuildShare share(options);
   RunLog log;
   RecordedNotes progress(listener);
 
@@ -313,10 +347,11 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
           FeatureImageSizePx(sizes, memory_gb, options.sfm.feature_size_px);
     }
   }
-  io::SetWriter writer(options.output, fingerprint.dump(), options.force);
+  io::SetWriter writer = share.OpenWriter(options, fingerprint.dump());
+  share.Lock(writer.work_folder());
   if (!options.force_stage.empty()) ForgetStage(writer.folder(), options.force_stage);
   if (is_derived) {
-    photos = FramesOf(options, writer.work_folder(), progress);
+    photos = FramesOf(options, writer.work_folder(), share.is_shared(), progress);
     try {
       look();
     } catch (const Error&) {
@@ -355,9 +390,12 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   calibrate.rig = rig;
   calibrate.metres = options.metres;
   calibrate.sfm = options.sfm;
+  calibrate.part = share.Sfm();
   const CalibratedPhotos calibrated =
-      CalibratePhotos(photos, calibrate, writer.work_folder() / "calibration", progress);
+      CamerasOf(photos, calibrate, share, writer.work_folder(), progress);
   log.AddEarlier(calibrated.earlier_wall_s, calibrated.earlier_cpu_s);
+  // Features know what their parts took.
+  AddParts(writer.work_folder(), {"matching", "verification"}, log);
   report.not_registered = calibrated.not_registered;
   report.why_not_registered = calibrated.why_not_registered;
   for (size_t i = 0; i < held_out.size(); ++i) {
@@ -368,20 +406,29 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   }
 
   log.Begin("undistortion");
+  AddParts(writer.work_folder(), {"undistortion"}, log);
   DtrSet set;
   set.unit = calibrated.unit;
   set.world_origin = calibrated.world_origin;
   set.frames.resize(1);
   std::vector<View>& views = set.frames.front().views;
   RequireTwoSources(photos, held_out, calibrated);
-  views = UndistortPhotos(photos, calibrated, held_out, {options.max_size_px, options.threads},
-                          writer, progress);
+  views = UndistortPhotos(photos, calibrated, held_out,
+                          {options.max_size_px, options.threads, share.Undistortion()}, writer,
+                          progress);
+  share.EndAfter("undistortion");
+  if (share.is_shared()) RequireImages(views, writer);
   const SparseScene sparse = SparseOf(calibrated, views);
 
   log.Begin("depth");
-  const DepthStageResult stage = DepthStage(
-      set, sparse, options.depth, quality,
-      {options.threads, options.seed, {}, PhotoCamerasOf(calibrated, views)}, writer, progress);
+  AddParts(writer.work_folder(), {"ranges", "search", "pass", "maps"}, log);
+  DepthStageOptions depth_options;
+  depth_options.threads = options.threads;
+  depth_options.seed = options.seed;
+  depth_options.photos = PhotoCamerasOf(calibrated, views);
+  depth_options.part = share.Depth();
+  const DepthStageResult stage =
+      DepthStage(set, sparse, options.depth, quality, depth_options, writer, progress);
   report.prior = stage.prior;
 
   log.Begin("finishing");
@@ -420,6 +467,26 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   report.calibration = calibrated.report;
   report.stages = log.stages();
   report.peak_memory_mib = static_cast<double>(PeakMemoryBytesWithPrograms()) / (1 << 20);
+  return report;
+}
+
+}  // namespace
+
+BuildReport BuildSet(const BuildOptions& asked, Progress& progress) {
+  const BuildOptions options = ByPreset(asked);
+  if (!options.part) return BuildOrPart(options, progress);
+  const double cpu_start_ms = ProcessCpuMilliseconds();
+  const auto start = std::chrono::steady_clock::now();
+  try {
+    BuildOrPart(options, progress);
+  } catch (const PartDone&) {
+  }
+  const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
+  WriteDonePart(io::SetWriter::WorkFolderOf(options.output), *options.part,
+                {wall.count(), (ProcessCpuMilliseconds() - cpu_start_ms) / 1e3});
+  BuildReport report;
+  report.part = options.part;
+  report.written = options.output;
   return report;
 }
 

@@ -60,8 +60,7 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
     sfm_options.intrinsics_are_known = true;
     sfm_options.lens_model = calib::NameOf(calib::CameraModel::kSimplePinhole);
   }
-  capture::PrepareSfmImages(photos, workspace / "photos", 0, options.threads, options.memory_gb,
-                            progress);
+  PreparePhotos(photos, options, workspace / "photos", progress);
   colmap::SfmResult sfm =
       colmap::RunSfm(workspace / "photos", inputs, workspace / "sfm", sfm_options, progress);
   if (panoramas) {
@@ -124,6 +123,17 @@ std::string ToJson(const CalibratedPhotos& calibrated, const capture::FolderCont
   return Text(json);
 }
 
+bool IsShared(const std::optional<colmap::SfmPart>& part) {
+  using Stage = colmap::SfmStage;
+  return part && part->stage != Stage::kPhotos && part->stage != Stage::kPairs;
+}
+
+void PreparePhotos(const capture::Capture& photos, const CalibrateOptions& options,
+                   const fs::path& folder, Progress& progress) {
+  if (IsShared(options.part)) return;  // other processes read them
+  capture::PrepareSfmImages(photos, folder, 0, options.threads, options.memory_gb, progress);
+}
+
 std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
                                              const CameraGroups& groups, const fs::path& folder) {
   std::vector<colmap::SfmImageInput> inputs;
@@ -149,6 +159,8 @@ colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options) {
   sfm.max_features = options.sfm.features < max_features ? options.sfm.features : 0;
   sfm.matching = options.sfm.matching;
   sfm.lens_model = options.sfm.lens_model;
+  sfm.part = options.part;
+  sfm.folder_is_shared = IsShared(options.part);
   return sfm;
 }
 

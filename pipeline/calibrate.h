@@ -42,6 +42,8 @@ struct CalibrateOptions {
   bool fixed_intrinsics = false;  ///< the model's are to be held; CalibratePhotos sets it
   std::string advice =
       {};  ///< what helps where cameras are not determined; CalibratePhotos sets it
+  /// A part of structure from motion: CalibratePhotos does this alone and throws PartDone.
+  std::optional<colmap::SfmPart> part = {};
 };
 
 /// Calibrated photos, frozen: everything later depends on this model alone.

@@ -38,15 +38,25 @@ class Run {
     }
   }
 
+  std::vector<DepthRange> Ranges() { return Widened(Together(), options_.widenings, progress_); }
+
   void Compute(const std::function<bool(int)>& already_done,
                const std::function<void(int, DepthEstimate&&, const DepthRange&)>& on_view) {
-    const std::vector<int> wanted = Wanted(already_done);
+    std::vector<int> wanted = Wanted(already_done);
+    if (options_.part) std::erase_if(wanted, [&](int view) { return !IsOfPart(view); });
     const std::vector<int> needed = Needed(wanted);
     CheckMemory(needed);
     // All of them: rounds also match what is not needed itself, and must do so alike every time.
     if (!needed.empty()) TellStrangers();
-    if (!needed.empty()) ranges_ = Widened(Together(), options_.widenings, progress_);
-    if (engine_.Rounds() > 0) RunRounds(Together(), needed, planes_, progress_);
+    if (!needed.empty()) ranges_ = Ranges();
+    if (options_.part && options_.part->pass <= engine_.Rounds()) {
+      return RunPass(Together(), wanted, planes_, options_.part->pass, progress_);
+    }
+    if (options_.part) {
+      RequirePass(Together(), needed, planes_, engine_.Rounds());
+    } else if (engine_.Rounds() > 0) {
+      RunRounds(Together(), needed, planes_, progress_);
+    }
     progress_.Stage("depth", static_cast<int>(needed.size()));
     // A view's pairs fill so many threads; with more, several views run side by side.
     const int threads = ResolveThreads(options_.engine.threads);
@@ -76,6 +86,9 @@ class Run {
   /// One view at a time: stores and pages belong to one thread, and a limit is for one view.
   bool Alone() const {
     return engine_.Rounds() > 0 || options_.memory_bytes > 0 || options_.load_pixels != nullptr;
+  }
+  bool IsOfPart(int view) const {
+    return options_.part->part.Has(static_cast<size_t>(view), views_.size());
   }
   bool Filters() const { return options_.consistency.min_agreeing > 0; }
   const std::vector<int>& NeighboursOf(int view) const {
@@ -225,6 +238,12 @@ class Run {
 };
 
 }  // namespace
+
+std::vector<DepthRange> WidenedRanges(std::span<const StereoView> views, const SparseScene& scene,
+                                      const Engine& engine, const DepthMapsOptions& options,
+                                      Progress& progress) {
+  return Run(views, scene, engine, options, progress).Ranges();
+}
 
 void ComputeDepthMaps(
     std::span<const StereoView> views, const SparseScene& scene, const Engine& engine,

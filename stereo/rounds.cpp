@@ -85,21 +85,46 @@ PlanesAround::PlanesAround(const Collection& collection, PlaneMapStore& store, i
   }
 }
 
+void RequirePass(const Collection& c, std::span<const int> views, const PlaneMapStore& store,
+                 int pass) {
+  if (c.engine->Rounds() == 0) return;
+  for (const int view : views) {
+    std::vector<int> around = NeighboursOf(c, view);
+    around.push_back(view);
+    const auto missing =
+        std::find_if(around.begin(), around.end(), [&](int v) { return !store.Has(pass, v); });
+    if (missing == around.end()) continue;
+    const std::string stage = pass == 0 ? "search" : "pass-" + std::to_string(pass);
+    throw Error("depth: expected planes of the stage `" + stage +
+                "` of every view, found none of "
+                "view " +
+                std::to_string(*missing) + "; run all parts of that stage first");
+  }
+}
+
+void RunPass(const Collection& collection, std::span<const int> views, PlaneMapStore& store,
+             int pass, Progress& progress) {
+  std::vector<int> missing;
+  for (const int view : views) {
+    if (!store.Has(pass, view)) missing.push_back(view);
+  }
+  if (pass > 0) RequirePass(collection, missing, store, pass - 1);
+  progress.Stage(pass == 0 ? "matching" : "consistency pass " + std::to_string(pass),
+                 static_cast<int>(missing.size()));
+  int done = 0;
+  for (const int view : missing) {
+    progress.ThrowIfInterrupted();
+    store.Save(pass, view,
+               pass == 0 ? First(collection, view, progress) : Next(collection, store, pass, view));
+    progress.Update(++done);
+  }
+}
+
 void RunRounds(const Collection& collection, std::span<const int> needed, PlaneMapStore& store,
                Progress& progress) {
   const std::vector<std::vector<int>> missing = Missing(collection, needed, store);
   for (int round = 0; round < static_cast<int>(missing.size()); ++round) {
-    const std::vector<int>& views = missing[static_cast<size_t>(round)];
-    progress.Stage(round == 0 ? "matching" : "consistency pass " + std::to_string(round),
-                   static_cast<int>(views.size()));
-    int done = 0;
-    for (const int view : views) {
-      progress.ThrowIfInterrupted();
-      store.Save(
-          round, view,
-          round == 0 ? First(collection, view, progress) : Next(collection, store, round, view));
-      progress.Update(++done);
-    }
+    RunPass(collection, missing[static_cast<size_t>(round)], store, round, progress);
     if (round > 0) store.Drop(round - 1);
   }
 }

@@ -58,4 +58,15 @@ class PlanesAround {
 void RunRounds(const Collection& collection, std::span<const int> needed, PlaneMapStore& store,
                Progress& progress);
 
+/// One pass (0: the search) of these views alone: what `store` has already is not computed again.
+/// The pass before must be there, of their neighbours too: throws Error as RequirePass; else as
+/// RunRounds.
+void RunPass(const Collection& collection, std::span<const int> views, PlaneMapStore& store,
+             int pass, Progress& progress);
+
+/// Throws Error where `store` lacks planes of `pass` of these views or their neighbours; never
+/// where the engine has no passes.
+void RequirePass(const Collection& collection, std::span<const int> views,
+                 const PlaneMapStore& store, int pass);
+
 }  // namespace dtr::stereo

@@ -251,7 +251,7 @@ std::vector<calib::MatchedPair> MatchWithoutCameras(const fs::path& images_dir,
   options.engine = SfmEngine::kGlobal;
   const std::vector<SfmImageInput> inputs = InputsOf(images);
   Workspace workspace(workspace_folder, images_dir, inputs, "", ResolveThreads(options.threads),
-                      progress, options.engine);
+                      progress, options.engine, options.folder_is_shared);
   SfmReport report;
   FeaturesAndMatches(workspace, GroupCameras(workspace.images(), CameraModelOf(options), true),
                      options, report);
@@ -268,7 +268,9 @@ SfmResult TriangulateWithPoses(const fs::path& images_dir, std::span<const Posed
   if (options.engine == SfmEngine::kColmap) RequireColmapsModels(images);
   const KnownCameras known = Arranged(images);
   Workspace workspace(workspace_folder, images_dir, InputsOf(known.images), "",
-                      ResolveThreads(options.threads), progress, options.engine);
+                      ResolveThreads(options.threads), progress, options.engine,
+                      options.folder_is_shared);
+  if (options.part && options.part->stage == SfmStage::kPhotos) throw PartDone();
   SfmResult result;
   // Where no pair could overlap the cameras are doubtful: the photos themselves are asked then.
   const ImagePairs pairs = PairsThatMayOverlap(known.images);

@@ -4,14 +4,17 @@
 
 #include <algorithm>
 #include <atomic>
+#include <functional>
 #include <map>
 
 #include "calib/colmap/database.h"
+#include "calib/colmap/feature_parts.h"
 #include "calib/colmap/graph_database.h"
 #include "calib/colmap/point_colours.h"
 #include "calib/sfm/features/sift.h"
 #include "calib/sfm/mapping/global_mapper.h"
 #include "calib/sfm/matching/match_photos.h"
+#include "calib/sfm/matching/pair_journal.h"
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -90,6 +93,18 @@ std::optional<std::vector<std::pair<int, int>>> PairsFor(const std::vector<SfmIm
   return pairs;
 }
 
+sfm::MatchPart MatchPartOf(const SfmPart& part) {
+  using Stage = sfm::MatchPart::Stage;
+  switch (part.stage) {
+    case SfmStage::kMatching:
+      return {Stage::kMatching, part.part};
+    case SfmStage::kVerification:
+      return {Stage::kVerification, part.part};
+    default:
+      return {Stage::kPairs, {}};
+  }
+}
+
 }  // namespace
 
 GroupLenses LensesOf(const Workspace& workspace, const std::vector<CameraGroup>& groups) {
@@ -121,19 +136,14 @@ sfm::Features FeaturesOf(const fs::path& photo, const fs::path& mask_file, int m
   return sfm::DetectSift(grey.data(), grey.width(), grey.height(), mask.data(), options);
 }
 
-void OwnFeatures(Workspace& workspace, const fs::path& database,
-                 const std::vector<CameraGroup>& groups, const ExtractionPlan& plan) {
-  const fs::path working = database.string() + ".working", note = database.string() + ".begun";
-  const size_t kept = fs::exists(database) ? workspace.Kept(note).value_or(0) : 0;
-  if (kept == 0) {
-    // A note must never meet features of other photos: it goes before a new database comes.
-    RemoveAll(note);
-    SyncFolder(note.parent_path());
-    RemoveDatabase(database);  // with the journal of a killed write, which SQLite would play back
-    CreateDatabase(workspace, working, groups);
-    MoveDatabase(working, database);
-  }
-  const std::vector<size_t> images = InOrder(groups);
+namespace {
+
+// Features of photos, from wherever.
+using FindFeatures = std::function<sfm::Features(size_t image)>;
+
+// Adds those of `images` to a database, of which `kept` is there already.
+void AddInBatches(Workspace& workspace, const fs::path& database, const std::vector<size_t>& images,
+                  size_t kept, const ExtractionPlan& plan, const FindFeatures& find) {
   workspace.progress().Stage("features", static_cast<int>(images.size()));
   workspace.progress().Update(static_cast<int>(kept));
   std::atomic<int> done = static_cast<int>(kept);
@@ -144,17 +154,61 @@ void OwnFeatures(Workspace& workspace, const fs::path& database,
     workspace.RunHere([&] {
       ParallelFor(0, static_cast<int>(count), plan.threads, [&](int i) {
         workspace.progress().ThrowIfInterrupted();
-        const size_t image = batch[static_cast<size_t>(i)];
-        features[static_cast<size_t>(i)] =
-            FeaturesOf(workspace.FileOf(image), workspace.images()[image].mask_file,
-                       plan.max_image_size_px, plan.max_features);
+        features[static_cast<size_t>(i)] = find(batch[static_cast<size_t>(i)]);
         workspace.progress().Update(++done);
       });
       AddFeatures(database, batch, features);
     });
     SyncFile(database);
-    workspace.Keep(note, begin + count);
+    workspace.Keep(NoteOf(database), begin + count);
   }
+}
+
+// How many photos a database has that an earlier call with this fingerprint made; else an empty
+// one, and 0.
+size_t KeptOrNew(Workspace& workspace, const fs::path& database,
+                 const std::vector<CameraGroup>& groups) {
+  const fs::path note = NoteOf(database);
+  const size_t kept = fs::exists(database) ? workspace.Kept(note).value_or(0) : 0;
+  if (kept > 0) return kept;
+  // A note must never meet features of other photos: it goes before a new database comes.
+  RemoveAll(note);
+  SyncFolder(note.parent_path());
+  RemoveDatabase(database);  // with the journal of a killed write, which SQLite would play back
+  const fs::path working = database.string() + ".working";
+  CreateDatabase(workspace, working, groups);
+  MoveDatabase(working, database);
+  return 0;
+}
+
+}  // namespace
+
+void OwnFeatures(Workspace& workspace, const fs::path& database,
+                 const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
+                 const std::optional<SfmPart>& part) {
+  const FindFeatures detect = [&](size_t image) {
+    return FeaturesOf(workspace.FileOf(image), workspace.images()[image].mask_file,
+                      plan.max_image_size_px, plan.max_features);
+  };
+  const std::vector<size_t> images = InOrder(groups);
+  if (part && part->stage == SfmStage::kFeatures) {
+    const std::vector<size_t> own(
+        images.begin() + static_cast<std::ptrdiff_t>(part->part.Begin(images.size())),
+        images.begin() + static_cast<std::ptrdiff_t>(part->part.End(images.size())));
+    const fs::path file = PartOf(database, part->part);
+    AddInBatches(workspace, file, own, KeptOrNew(workspace, file, groups), plan, detect);
+    throw PartDone();
+  }
+  if (part && part->stage != SfmStage::kPairs) {
+    throw Error("features: expected those of all photos, found none; run the stage `pairs` first");
+  }
+  const FeatureParts parts(workspace, database);
+  AddInBatches(workspace, database, images, KeptOrNew(workspace, database, groups), plan,
+               [&](size_t image) {
+                 const auto found = parts.Of(IdOf(image));
+                 return found ? *found : detect(image);
+               });
+  parts.Remove();
 }
 
 void OwnMatches(Workspace& workspace, const fs::path& features,
@@ -185,6 +239,7 @@ void OwnMatches(Workspace& workspace, const fs::path& features,
   match.descriptor_gb = kDescriptorShare * options.memory_gb;
   match.journal = workspace.folder() / "matches.begun";
   match.journal_inputs = workspace.fingerprint();
+  if (options.part) match.part = MatchPartOf(*options.part);
   match.progress = &workspace.progress();
   workspace.RunHere([&] {
     const sfm::MatchResult result =
@@ -193,7 +248,7 @@ void OwnMatches(Workspace& workspace, const fs::path& features,
     CopyDatabase(features, workspace.database());
     WriteViewGraph(workspace.database(), result.graph);
   });
-  RemoveAll(match.journal);
+  sfm::matching::PairJournal::Remove(match.journal);
 }
 
 namespace {

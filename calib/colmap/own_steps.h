@@ -28,13 +28,17 @@ sfm::Features FeaturesOf(const std::filesystem::path& photo, const std::filesyst
                          int max_image_size_px, int max_features);
 
 /// Features of all photos into `database`, batch by batch: an interrupted step of the same
-/// fingerprint goes on after the last of them.
+/// fingerprint goes on after the last of them. Features that a process with a part has found are
+/// taken over. `part`: of kFeatures, those of a part of the photos into a database of its own, and
+/// PartDone; a later stage needs `database` and throws Error.
 void OwnFeatures(Workspace& workspace, const std::filesystem::path& database,
-                 const std::vector<CameraGroup>& groups, const ExtractionPlan& plan);
+                 const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
+                 const std::optional<SfmPart>& part);
 
 /// Matches of the features in `features` into the workspace's database, with the lenses that they
 /// determine. `known_lenses`: intrinsics are given and hold; else focal lengths and distortion are
-/// estimated. Of the pairs that `matching` names only those of `allowed`, where it is given.
+/// estimated. Of the pairs that `matching` names only those of `allowed`, where it is given. With
+/// options.part only that, and PartDone.
 void OwnMatches(Workspace& workspace, const std::filesystem::path& features,
                 const std::vector<CameraGroup>& groups, Matching matching,
                 const SfmOptions& options, bool known_lenses,

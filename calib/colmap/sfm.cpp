@@ -228,7 +228,8 @@ SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> imag
                     images_dir.string(), images.size()));
   }
   Workspace workspace(workspace_folder, images_dir, images, "", ResolveThreads(options.threads),
-                      progress, options.engine);
+                      progress, options.engine, options.folder_is_shared);
+  if (options.part && options.part->stage == SfmStage::kPhotos) throw PartDone();
   const auto groups = GroupCameras(workspace.images(), lens, options.share_intrinsics_within_group);
   SfmResult result;
   FeaturesAndMatches(workspace, groups, options, result.report, {}, options.intrinsics_are_known);
@@ -243,6 +244,7 @@ SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> imag
     ReadOwnMappingNote(workspace, result.report);
     WriteReport(workspace.folder(), result.report);
   }
+  if (options.folder_is_shared) return result;  // who is alone says what follows
   try {
     const PairCounts pairs = CountPairs(workspace);
     result.report.lack_of_parallax = LackOfParallax(pairs);
@@ -265,7 +267,7 @@ calib::SfmModel PointsOfMatches(const fs::path& images_dir, std::span<const SfmI
                                 const std::map<std::string, Pose>& cam_from_world,
                                 Progress& progress) {
   Workspace workspace(workspace_folder, images_dir, images, "", ResolveThreads(options.threads),
-                      progress, options.engine);
+                      progress, options.engine, options.folder_is_shared);
   sfm::ViewGraph graph = ReadViewGraph(workspace.database());
   std::vector<Pose> poses;
   std::vector<bool> posed;
@@ -298,7 +300,7 @@ std::optional<SfmResult> MapWithFixedIntrinsics(const fs::path& images_dir,
                                                 const fs::path& workspace_folder,
                                                 const SfmOptions& options, Progress& progress) {
   Workspace workspace(workspace_folder, images_dir, images, "", ResolveThreads(options.threads),
-                      progress, options.engine);
+                      progress, options.engine, options.folder_is_shared);
   const auto groups = GroupCameras(workspace.images(), CameraModelOf(options),
                                    options.share_intrinsics_within_group);
   if (!AllHavePriors(groups)) return {};

@@ -10,6 +10,7 @@
 
 #include "calib/matched_pair.h"
 #include "calib/sfm_model.h"
+#include "dtr/base/part.h"
 #include "dtr/base/progress.h"
 
 namespace dtr::colmap {
@@ -65,6 +66,19 @@ constexpr int MaxFeaturesOf(SfmEngine engine) {
   return engine == SfmEngine::kColmap ? kMaxFeatures : kMaxOwnFeatures;
 }
 
+/// A stage of structure from motion by calib/sfm that several processes share, each with a part.
+enum class SfmStage {
+  kPhotos,        ///< the folder, with links to the photos; one process
+  kFeatures,      ///< of a part of the photos
+  kPairs,         ///< all features in one database, and which pairs are matched; one process
+  kMatching,      ///< the largest features of a part of the pairs
+  kVerification,  ///< relative poses and all features of a part of the pairs
+};
+struct SfmPart {
+  SfmStage stage = SfmStage::kPhotos;
+  Part part;
+};
+
 struct SfmOptions {
   SfmEngine engine = SfmEngine::kAuto;
   Matching matching = Matching::kAuto;
@@ -81,6 +95,11 @@ struct SfmOptions {
   /// The priors are exact, with no distortion, and hold: views made of panoramas. Of the engines
   /// kGlobal and kAuto.
   bool intrinsics_are_known = false;
+  /// Other processes work in the folder, which one that was alone has made: nothing of theirs is
+  /// touched, and photos that have their size and time count as what they were.
+  bool folder_is_shared = false;
+  /// Does this alone and throws PartDone; with kGlobal and kAuto. Empty: everything.
+  std::optional<SfmPart> part = {};
 };
 
 /// "auto", "exhaustive", "preselected", "sequential".

@@ -56,9 +56,10 @@ void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& gr
     if (options.engine == SfmEngine::kColmap) {
       ExtractFeaturesResumably(workspace, features, groups, plan, options.seed);
     } else {
-      OwnFeatures(workspace, features, groups, plan);
+      OwnFeatures(workspace, features, groups, plan, options.part);
     }
   });
+  if (options.part && options.part->stage == SfmStage::kFeatures) throw PartDone();
   auto text = fmt::format("matching {} seed {}", static_cast<int>(report.matching), options.seed);
   if (known_lenses && options.engine != SfmEngine::kColmap) text += " known lenses";
   for (const SfmImageInput& image : workspace.images()) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cctype>
 #include <chrono>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "calib/colmap/model_io.h"
@@ -103,6 +104,40 @@ void ThrowFullDisk(const fs::path& folder, const std::string& consequence) {
       folder.string(), consequence));
 }
 
+// Hashes of files, kept with their sizes and times.
+class FileHashes {
+ public:
+  /// `trust`: a file whose size and time are those kept has the hash that was kept.
+  FileHashes(fs::path file, bool trust) : file_(std::move(file)) {
+    if (!trust || !fs::exists(file_)) return;
+    const json kept = json::parse(ReadFile(file_, kLargestHashes), nullptr, false);
+    if (kept.is_object()) kept_ = kept;
+  }
+
+  std::string Of(const fs::path& file) {
+    const fs::path key = fs::absolute(file);
+    std::error_code error;
+    const auto size = fs::file_size(file, error);
+    const auto time = fs::last_write_time(file, error);
+    const json state = {error ? 0 : size, error ? 0 : time.time_since_epoch().count()};
+    const auto kept = kept_.find(key.string());
+    const bool known = !error && kept != kept_.end() && kept->is_array() && kept->size() == 2 &&
+                       (*kept)[0] == state && (*kept)[1].is_string();
+    const std::string hash = known ? (*kept)[1].get<std::string>() : Sha256OfFile(file);
+    found_[key.string()] = {state, hash};
+    return hash;
+  }
+
+  void Write() const {
+    WriteFileAtomically(file_, found_.dump(0, ' ', false, json::error_handler_t::replace) + "\n");
+  }
+
+ private:
+  static constexpr std::uintmax_t kLargestHashes = std::uintmax_t{1} << 30;
+  fs::path file_;
+  json kept_ = json::object(), found_ = json::object();
+};
+
 }  // namespace
 
 const char* NameOf(SfmEngine engine) {
@@ -151,7 +186,7 @@ std::string Workspace::AliasFor(const std::string& prefix, size_t index, const s
 
 Workspace::Workspace(const fs::path& folder, const fs::path& images_dir,
                      std::span<const SfmImageInput> images, const std::string& alias_prefix,
-                     int threads, Progress& progress, SfmEngine engine)
+                     int threads, Progress& progress, SfmEngine engine, bool is_shared)
     : folder_(fs::absolute(folder)),
       images_(images.begin(), images.end()),
       threads_(threads),
@@ -159,10 +194,9 @@ Workspace::Workspace(const fs::path& folder, const fs::path& images_dir,
       engine_(engine) {
   std::sort(images_.begin(), images_.end(),
             [](const auto& a, const auto& b) { return a.name < b.name; });
-  RemoveAll(images_folder());
-  RemoveAll(masks_folder());
   for (const char* part : {"images", "logs", "lists"}) MakeFolder(folder_ / part);
-  RemoveTemporaryFiles(folder_);
+  if (!is_shared) RemoveTemporaryFiles(folder_);
+  FileHashes hashes(folder_ / "hashes.json", is_shared);
   json names = json::object(), identity = json::array();
   for (size_t i = 0; i < images_.size(); ++i) {
     const SfmImageInput& image = images_[i];
@@ -173,21 +207,45 @@ Workspace::Workspace(const fs::path& folder, const fs::path& images_dir,
       throw UsageError(fmt::format("{}: expected a positive size, found {} x {}", image.name,
                                    image.width_px, image.height_px));
     }
-    const fs::path file = images_dir / image.name;
-    identity.push_back({image.name, image.width_px, image.height_px, Sha256OfFile(file)});
-    if (!image.mask_file.empty()) identity.back().push_back(Sha256OfFile(image.mask_file));
+    identity.push_back(
+        {image.name, image.width_px, image.height_px, hashes.Of(images_dir / image.name)});
+    if (!image.mask_file.empty()) identity.back().push_back(hashes.Of(image.mask_file));
     aliases_.push_back(AliasFor(alias_prefix, i, image.name));
     names[aliases_.back()] = image.name;
-    Link(file, FileOf(i));
-    if (image.mask_file.empty()) continue;
-    MakeFolder(masks_folder());
-    Link(image.mask_file, masks_folder() / (AliasOf(i) + ".png"));  // COLMAP's name for it
   }
+  LinkPhotos(images_dir);
   constexpr int kIndent = 1;
   const auto replace = json::error_handler_t::replace;  // names need not be UTF-8
-  WriteFileAtomically(folder_ / "images.json", names.dump(kIndent, ' ', false, replace) + "\n");
+  if (!is_shared) {
+    WriteFileAtomically(folder_ / "images.json", names.dump(kIndent, ' ', false, replace) + "\n");
+    hashes.Write();
+  }
   if (engine_ == SfmEngine::kColmap) program();
   fingerprint_ = HashOfText(version() + identity.dump(-1, ' ', false, replace));
+}
+
+// Touches nothing where all is as it should be.
+void Workspace::LinkPhotos(const fs::path& images_dir) const {
+  std::map<fs::path, fs::path> wanted;
+  for (size_t i = 0; i < images_.size(); ++i) {
+    wanted[FileOf(i)] = images_dir / images_[i].name;
+    if (images_[i].mask_file.empty()) continue;
+    MakeFolder(masks_folder());
+    // COLMAP's name for it.
+    wanted[masks_folder() / (AliasOf(i) + ".png")] = images_[i].mask_file;
+  }
+  for (const fs::path& links : {images_folder(), masks_folder()}) {
+    if (!fs::exists(links)) continue;
+    std::vector<fs::path> others;
+    for (const auto& entry : fs::directory_iterator(links)) {
+      if (!wanted.contains(entry.path())) others.push_back(entry.path());
+    }
+    for (const fs::path& other : others) RemoveAll(other);
+  }
+  for (const auto& [link, target] : wanted) {
+    std::error_code none;
+    if (fs::read_symlink(link, none) != fs::absolute(target)) Link(target, link);
+  }
 }
 
 std::string Workspace::version() const {

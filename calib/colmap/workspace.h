@@ -14,17 +14,19 @@
 namespace dtr::colmap {
 
 /// Layout: images/ (links under plain names, see AliasOf), images.json (which link is which photo),
+/// hashes.json (of the photos, by size and time),
 /// logs/, lists/, STEP.done.json (stamps), database.db, and what the steps leave.
 class Workspace {
  public:
   /// Sorts `images` by name (byte order), checks that all are there, links them.
   /// `alias_prefix` keeps photos of two workspaces apart that meet in one database. With the engine
   /// kColmap its version is part of every step's inputs; with others COLMAP may be missing.
+  /// `is_shared`: see SfmOptions::folder_is_shared.
   /// Throws UsageError on duplicate names or sizes that cannot be, Error on files that are absent
   /// or cannot be linked.
   Workspace(const std::filesystem::path& folder, const std::filesystem::path& images_dir,
             std::span<const SfmImageInput> images, const std::string& alias_prefix, int threads,
-            Progress& progress, SfmEngine engine = SfmEngine::kColmap);
+            Progress& progress, SfmEngine engine = SfmEngine::kColmap, bool is_shared = false);
 
   const std::filesystem::path& folder() const { return folder_; }
   std::filesystem::path images_folder() const { return folder_ / "images"; }
@@ -79,6 +81,8 @@ class Workspace {
   SfmReport Report() const;
 
  private:
+  void LinkPhotos(const std::filesystem::path& images_dir) const;
+
   std::filesystem::path folder_;
   std::vector<SfmImageInput> images_;
   std::vector<std::string> aliases_;

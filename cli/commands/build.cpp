@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdio>
 
 #include "cli/command.h"
 #include "cli/depth_options.h"
@@ -9,6 +10,7 @@
 #include "cli/panorama_options.h"
 #include "cli/sfm_options.h"
 #include "cli/video_options.h"
+#include "dtr/base/error.h"
 #include "pipeline/build.h"
 #include "pipeline/build_dynamic.h"
 #include "pipeline/import.h"
@@ -20,6 +22,7 @@ struct BuildArguments {
   pipeline::BuildOptions options;
   bool is_dynamic = false;
   std::string temporal = "on";
+  std::string stage, part = "1/1";
   pipeline::DynamicOptions dynamic;
 };
 
@@ -52,8 +55,41 @@ void AddDynamicOptions(CLI::App& command, BuildArguments& arguments) {
       ->needs(dynamic);
 }
 
+// What processes that share a build are given.
+void AddPartOptions(CLI::App& command, BuildArguments& arguments) {
+  CLI::Option* stage = command.add_option(
+      "--stage", arguments.stage,
+      "Do this stage alone and keep its work beside the set, for processes that share a build "
+      "(dtr batch): capture, features, pairs, matching, verification, calibration, undistortion, "
+      "ranges, search, pass-N, maps; the same command without it ends the build");
+  stage->type_name("NAME");
+  command
+      .add_option("--part", arguments.part,
+                  "With --stage: part K of N of its photos, pairs or views [1/1]")
+      ->needs(stage)
+      ->type_name("K/N");
+}
+
+std::optional<pipeline::BuildPart> PartFrom(const BuildArguments& arguments) {
+  if (arguments.stage.empty()) return {};
+  if (arguments.is_dynamic) {
+    throw UsageError("`dynamic`: its time steps follow each other; leave out `stage`");
+  }
+  int index = 0, count = 0, used = 0;
+  const std::string& text = arguments.part;
+  if (std::sscanf(text.c_str(), "%d/%d%n", &index, &count, &used) != 2 ||
+      static_cast<size_t>(used) != text.size() || count < 1 || index < 1 || index > count) {
+    throw UsageError(fmt::format("`part` {}: expected K/N with K from 1 to N", text));
+  }
+  return pipeline::BuildPart{arguments.stage, {index - 1, count}};
+}
+
 void SayResult(const pipeline::BuildOptions& options, const pipeline::BuildReport& report,
                Console& console) {
+  if (report.part) {
+    console.Say(fmt::format("{}: done: {}", options.output.string(), NameOf(*report.part)));
+    return;
+  }
   if (report.set.frames.size() > 1) {
     console.Say(
         fmt::format("{}: {} time steps of:", options.output.string(), report.set.frames.size()));
@@ -144,18 +180,20 @@ void AddBuildCommand(CLI::App& app) {
                         "Of an interrupted build: do this stage and all after it again")
             ->check(CLI::IsMember(pipeline::StagesKept()))
             ->type_name("NAME");
+        AddPartOptions(command, *arguments);
         return [arguments, options, words](const Context& context) -> int {
           context.console.KeepsWork();
           options->metres = MetreOptionsFrom(options->metres.gps, *words);
           options->threads = context.common.threads;
           options->seed = context.common.seed;
+          options->part = PartFrom(*arguments);
           arguments->dynamic.temporal = arguments->temporal == "on";
           const auto report =
               arguments->is_dynamic
                   ? pipeline::BuildDynamicSet(*options, arguments->dynamic, context.console)
                   : pipeline::BuildSet(*options, context.console);
           SayResult(*options, report, context.console);
-          context.EmitJson(pipeline::ToJson(report));
+          if (!report.part) context.EmitJson(pipeline::ToJson(report));
           return kDone;
         };
       });

@@ -2,10 +2,13 @@
 
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/utsname.h>
 
 #include <cerrno>
+#include <cstdint>
 #include <cstring>
 #include <set>
+#include <string_view>
 #include <system_error>
 #include <tuple>
 #include <vector>
@@ -77,7 +80,7 @@ void Rename(const fs::path& from, const fs::path& to) {
 }
 
 void CopyFileAtomically(const fs::path& from, const fs::path& to) {
-  const fs::path temporary = to.string() + ".tmp" + std::to_string(getpid());
+  const fs::path temporary = TemporaryFor(to);
   try {
     std::error_code error;
     fs::remove(temporary, error);  // of an earlier process of our number, perhaps to be read only
@@ -108,6 +111,21 @@ void AppendDurably(const fs::path& file, std::string_view record) {
   } catch (const std::system_error& failure) {
     Fail(file, "cannot be written", failure.code().message());
   }
+}
+
+fs::path TemporaryFor(const fs::path& file) {
+  // Process numbers are of one machine; its name tells machines apart.
+  static const std::uint32_t machine = [] {
+    utsname name{};
+    uname(&name);
+    constexpr std::uint32_t kOffset = 2166136261u, kPrime = 16777619u;  // FNV-1a
+    std::uint32_t hash = kOffset;
+    for (const char c : std::string_view(name.nodename)) {
+      hash = (hash ^ static_cast<unsigned char>(c)) * kPrime;
+    }
+    return hash;
+  }();
+  return file.string() + ".tmp" + std::to_string(machine) + std::to_string(getpid());
 }
 
 bool IsTemporaryFile(const fs::path& file) {
@@ -169,11 +187,11 @@ void RejectForeign(const fs::path& folder, const std::function<bool(const std::s
       *foreign.begin() + "; move it away");
 }
 
-std::optional<FileLock> FileLock::Try(const fs::path& file) {
+std::optional<FileLock> FileLock::Try(const fs::path& file, Kind kind) {
   const int fd = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
   if (fd < 0) Fail(file, "cannot be opened", std::strerror(errno));
   FileLock lock(fd);
-  if (flock(fd, LOCK_EX | LOCK_NB) == 0) return lock;
+  if (flock(fd, (kind == Kind::kAlone ? LOCK_EX : LOCK_SH) | LOCK_NB) == 0) return lock;
   if (errno != EWOULDBLOCK) Fail(file, "cannot be locked", std::strerror(errno));
   return std::nullopt;
 }

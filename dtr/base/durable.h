@@ -32,6 +32,9 @@ void CopyFileAtomically(const std::filesystem::path& from, const std::filesystem
 /// may leave a part of the record: its reader must know a whole one.
 void AppendDurably(const std::filesystem::path& file, std::string_view record);
 
+/// A name beside `file` that no other process writes to now, on this machine or another one that
+/// shares the folder; IsTemporaryFile knows it.
+std::filesystem::path TemporaryFor(const std::filesystem::path& file);
 /// True for what WriteFileAtomically and CopyFileAtomically leave when they are killed:
 /// NAME.tmp and a number.
 bool IsTemporaryFile(const std::filesystem::path& file);
@@ -51,12 +54,17 @@ bool IsEmptyFolder(const std::filesystem::path& folder);
 void RejectForeign(const std::filesystem::path& folder,
                    const std::function<bool(const std::string& name)>& ours);
 
-/// Held by one process at a time; the system releases it when the process ends, however it ends.
+/// Held by one process at a time, or shared; the system releases it when the process ends, however
+/// it ends.
 class FileLock {
  public:
+  enum class Kind {
+    kAlone,
+    kShared,  ///< several processes may have it, as long as none has it alone
+  };
   /// Empty when another process has the lock. Makes the file where there is none; throws Error
   /// where it cannot be opened, or where the file system has no locks.
-  static std::optional<FileLock> Try(const std::filesystem::path& file);
+  static std::optional<FileLock> Try(const std::filesystem::path& file, Kind kind = Kind::kAlone);
   ~FileLock();
   FileLock(FileLock&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
   FileLock& operator=(FileLock&& other) noexcept {

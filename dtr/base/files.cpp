@@ -6,6 +6,7 @@
 #include <fstream>
 #include <tuple>
 
+#include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/open_file.h"
 
@@ -42,7 +43,7 @@ fs::path WithoutTrailingSlash(const fs::path& path) {
 }
 
 void WriteFileAtomically(const fs::path& file, std::string_view content) {
-  const fs::path temporary = file.string() + ".tmp" + std::to_string(getpid());
+  const fs::path temporary = TemporaryFor(file);
   try {
     {
       const OpenFile out(temporary, O_WRONLY | O_CREAT | O_TRUNC, 0644);

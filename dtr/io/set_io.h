@@ -86,6 +86,12 @@ class SetWriter {
   /// writes it now.
   SetWriter(const std::filesystem::path& target, const std::string& fingerprint_json, bool force,
             ImageCoding image_coding = ImageCoding::kPng);
+  /// Joins the work on a set that a process with the same fingerprint has begun, beside others that
+  /// join it, each with a part of its own: RestoreView, WriteView and the folders. Finish and all
+  /// else are for one that is alone. Throws as the constructor, and UsageError where nothing was
+  /// begun; what is there stays in every case.
+  static SetWriter Join(const std::filesystem::path& target, const std::string& fingerprint_json,
+                        bool force);
   /// What the constructor says of a target that cannot be written, before any work and without
   /// touching anything. Throws UsageError.
   static void RequireTarget(const std::filesystem::path& target, bool force);
@@ -93,13 +99,17 @@ class SetWriter {
   ~SetWriter();
   SetWriter(const SetWriter&) = delete;
   SetWriter& operator=(const SetWriter&) = delete;
+  SetWriter(SetWriter&&) noexcept;
 
   /// name.dtr.partial: where everything lies until Finish.
   const std::filesystem::path& folder() const;
-  /// Takes the partial folder away: for work that no later command could go on with.
+  /// Takes the partial folder away, unless this is joined work: for what no later command could go
+  /// on with.
   void Discard() noexcept;
   /// folder()/work: for checkpoints of other stages; removed by Finish.
   std::filesystem::path work_folder() const;
+  /// The same of a set that is being written.
+  static std::filesystem::path WorkFolderOf(const std::filesystem::path& target);
   /// True when an earlier run with this fingerprint left work behind.
   bool resumed() const;
 
@@ -150,6 +160,7 @@ class SetWriter {
 
  private:
   struct State;
+  explicit SetWriter(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
 };
 

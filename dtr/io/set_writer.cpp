@@ -47,6 +47,22 @@ std::string Canonical(const std::string& fingerprint_json, const std::string& wh
   return nlohmann::json(parsed).dump(2) + "\n";  // sorts the keys
 }
 
+// The names of what differs in two canonical fingerprints; empty where one is none.
+std::string DifferingKeys(const std::string& a, const std::string& b) {
+  const nlohmann::json left = nlohmann::json::parse(a, nullptr, false),
+                       right = nlohmann::json::parse(b, nullptr, false);
+  if (!left.is_object() || !right.is_object()) return "";
+  std::set<std::string> keys;
+  for (const auto* side : {&left, &right}) {
+    for (const auto& [key, value] : side->items()) {
+      if (left.value(key, nlohmann::json()) != right.value(key, nlohmann::json())) keys.insert(key);
+    }
+  }
+  std::string names;
+  for (const std::string& key : keys) names += (names.empty() ? "" : ", ") + key;
+  return names;
+}
+
 // True when a partial folder has more in it than what the constructor itself puts there. What a
 // killed process had not finished to write is nobody's work.
 bool HoldsWork(const fs::path& partial) {
@@ -113,6 +129,7 @@ auto AsError(const Function& function) {
 struct SetWriter::State {
   fs::path target, partial, aside, done_work;
   bool force = false, resumed = false, finished = false;
+  bool joined = false;  // beside other processes
   ImageCoding image_coding = ImageCoding::kPng;
   std::optional<FileLock> lock;
 
@@ -124,6 +141,8 @@ struct SetWriter::State {
   void ExpectReplaceable() const;
   std::optional<FileLock> Lock(const fs::path& file) const;
   void OpenPartial(const std::string& fingerprint);
+  void JoinPartial(const std::string& fingerprint);
+  void ExpectFingerprint(const std::string& fingerprint) const;
   std::string PathOf(const View& view, const std::string& kind, const std::string& extension) const;
   template <typename Write>
   StoredFile Store(const std::string& path, const Write& write) const;
@@ -207,14 +226,34 @@ void SetWriter::State::OpenPartial(const std::string& fingerprint) {
   if (error) throw Error(partial.string() + ": cannot be made: " + error.message());
   if (!foreign) lock = Lock(partial / kLock);
   const bool holds_work = HoldsWork(partial);
-  if (holds_work &&
-      (foreign || ReadFile(partial / kFingerprint, kRecordLimitBytes) != fingerprint)) {
-    throw UsageError(partial.string() + ": expected work of the same inputs and options, found " +
-                     "others; run that command again to finish it, or delete the folder");
-  }
+  if (holds_work) ExpectFingerprint(fingerprint);
   RemoveTemporaryFiles(partial);  // of a run that was killed
   resumed = holds_work;
   if (!resumed) WriteFileAtomically(partial / kFingerprint, fingerprint);
+}
+
+void SetWriter::State::JoinPartial(const std::string& fingerprint) {
+  if (!fs::exists(partial / kFingerprint)) {
+    throw UsageError(partial.string() +
+                     ": expected a build to join, found none; run its stage `capture` first");
+  }
+  lock = FileLock::Try(partial / kLock, FileLock::Kind::kShared);
+  if (!lock) {
+    throw UsageError(partial.string() +
+                     ": another process is writing the whole of this set; wait for it");
+  }
+  ExpectFingerprint(fingerprint);
+  resumed = joined = true;
+}
+
+void SetWriter::State::ExpectFingerprint(const std::string& fingerprint) const {
+  const bool foreign = !fs::exists(partial / kFingerprint);
+  const std::string found = foreign ? "" : ReadFile(partial / kFingerprint, kRecordLimitBytes);
+  if (found == fingerprint) return;
+  const std::string differ = DifferingKeys(found, fingerprint);
+  throw UsageError(partial.string() + ": expected work of the same inputs and options, found " +
+                   "others" + (differ.empty() ? "" : " (" + differ + " differ)") +
+                   "; run that command again to finish it, or delete the folder");
 }
 
 std::string SetWriter::State::PathOf(const View& view, const std::string& kind,
@@ -250,6 +289,23 @@ SetWriter::SetWriter(const fs::path& target, const std::string& fingerprint_json
   });
 }
 
+SetWriter::SetWriter(std::unique_ptr<State> state) : state_(std::move(state)) {}
+SetWriter::SetWriter(SetWriter&&) noexcept = default;
+
+SetWriter SetWriter::Join(const fs::path& target, const std::string& fingerprint_json, bool force) {
+  auto state = std::make_unique<State>();
+  state->target = WithoutSlash(target);
+  state->partial = Beside(state->target, ".partial");
+  state->aside = Beside(state->target, ".replaced");
+  state->done_work = Beside(state->target, ".partial.work");
+  state->force = force;
+  AsError([&] {
+    state->ExpectReplaceable();
+    state->JoinPartial(Canonical(fingerprint_json, "fingerprint"));
+  });
+  return SetWriter(std::move(state));
+}
+
 void SetWriter::RequireTarget(const fs::path& target, bool force) {
   State state;
   state.target = WithoutSlash(target);
@@ -262,6 +318,7 @@ void SetWriter::RequireTarget(const fs::path& target, bool force) {
 }
 
 SetWriter::~SetWriter() {
+  if (!state_ || state_->joined) return;
   std::error_code ignored;
   try {
     // Nothing was done: leave nothing that would stand in the way of a corrected command.
@@ -272,6 +329,7 @@ SetWriter::~SetWriter() {
 }
 
 void SetWriter::Discard() noexcept {
+  if (state_->joined) return;
   std::error_code ignored;
   fs::remove_all(state_->partial, ignored);
   state_->lock.reset();
@@ -280,6 +338,9 @@ void SetWriter::Discard() noexcept {
 
 const fs::path& SetWriter::folder() const { return state_->partial; }
 fs::path SetWriter::work_folder() const { return state_->partial / kWork; }
+fs::path SetWriter::WorkFolderOf(const fs::path& target) {
+  return Beside(WithoutSlash(target), ".partial") / kWork;
+}
 bool SetWriter::resumed() const { return state_->resumed; }
 
 void SetWriter::WriteView(View& view, LengthUnit unit) {

@@ -1,5 +1,7 @@
 #include "calib/sfm/matching/match_photos.h"
 
+#include <fmt/format.h>
+
 #include <atomic>
 #include <limits>
 #include <stdexcept>
@@ -9,6 +11,7 @@
 #include "calib/sfm/matching/pair_journal.h"
 #include "calib/sfm/matching/photo_blocks.h"
 #include "calib/sfm/matching/vote_cameras.h"
+#include "dtr/base/error.h"
 #include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/base/random.h"
@@ -38,39 +41,58 @@ void Check(std::span<const MatchPhoto> photos, std::span<const calib::LensCamera
   }
 }
 
-// Matches of the largest features of all pairs, in order; what the journal has is not done again.
-std::vector<CoarsePair> CoarseSearch(std::span<const MatchPhoto> photos,
-                                     const std::vector<std::pair<int, int>>& pairs,
-                                     std::vector<CoarsePair> coarse, const MatchOptions& options,
-                                     PairJournal& journal, Progress& progress) {
+// The pairs that `done` lacks, of those of the part.
+template <typename T>
+std::vector<int> Missing(const std::vector<std::optional<T>>& done, const Part& part) {
+  std::vector<int> missing;
+  for (size_t k = part.Begin(done.size()); k < part.End(done.size()); ++k) {
+    if (!done[k]) missing.push_back(static_cast<int>(k));
+  }
+  return missing;
+}
+
+// The pairs of these numbers in blocks whose descriptors fit into memory.
+template <typename Work>
+void ForBlocks(const std::vector<std::pair<int, int>>& pairs, const std::vector<int>& which,
+               const std::vector<double>& bytes, const MatchOptions& options, const Work& work) {
+  std::vector<std::pair<int, int>> left;
+  for (const int k : which) left.push_back(pairs[static_cast<size_t>(k)]);
+  for (size_t begin = 0, end = begin; begin < left.size(); begin = end) {
+    end = BlockEnd(left, begin, bytes, options.descriptor_gb * kBytesPerGigabyte, kPairsPerBlock);
+    work(std::span(left).subspan(begin, end - begin), std::span(which).subspan(begin, end - begin));
+  }
+}
+
+// Matches of the largest features of those pairs of the part that have none yet.
+void CoarseSearch(std::span<const MatchPhoto> photos, const std::vector<std::pair<int, int>>& pairs,
+                  const Part& part, const MatchOptions& options, PairJournal& journal,
+                  Progress& progress, std::vector<std::optional<CoarsePair>>& coarse) {
   PhotoCache<LoadedDescriptors> largest(
       photos.size(), [&](int i) { return DescriptorsOf(photos, i, kLargest, options); },
       options.threads);
-  const std::vector<double> bytes = DescriptorBytes(photos, kLargest);
-  progress.Stage("comparing features", static_cast<int>(pairs.size()));
-  std::atomic<int> done = static_cast<int>(coarse.size());
-  for (size_t begin = coarse.size(), end = begin; begin < pairs.size(); begin = end) {
-    end = BlockEnd(pairs, begin, bytes, options.descriptor_gb * kBytesPerGigabyte, kPairsPerBlock);
-    largest.Require(std::span(pairs).subspan(begin, end - begin));
-    coarse.resize(end);
-    ParallelFor(static_cast<int>(begin), static_cast<int>(end), options.threads, [&](int k) {
-      progress.ThrowIfInterrupted();
-      const auto [a, b] = pairs[static_cast<size_t>(k)];
-      coarse[static_cast<size_t>(k)] = {a, b, CoarseMatches(largest[a].all, largest[b].all)};
-      progress.Update(++done);
-    });
-    journal.AddCoarse(std::span(coarse).subspan(begin, end - begin));
-  }
-  return coarse;
+  const std::vector<int> missing = Missing(coarse, part);
+  const size_t all = part.End(pairs.size()) - part.Begin(pairs.size());
+  progress.Stage("comparing features", static_cast<int>(all));
+  std::atomic<int> done = static_cast<int>(all - missing.size());
+  ForBlocks(pairs, missing, DescriptorBytes(photos, kLargest), options,
+            [&](std::span<const std::pair<int, int>> block, std::span<const int> which) {
+              largest.Require(block);
+              ParallelFor(0, static_cast<int>(which.size()), options.threads, [&](int i) {
+                progress.ThrowIfInterrupted();
+                const auto [a, b] = block[static_cast<size_t>(i)];
+                coarse[static_cast<size_t>(which[static_cast<size_t>(i)])] =
+                    CoarsePair{a, b, CoarseMatches(largest[a].all, largest[b].all)};
+                progress.Update(++done);
+              });
+              journal.AddCoarse(which, coarse);
+            });
 }
 
-// Pairs along epipolar lines, in order; those without a geometry are left out.
-std::vector<PairGeometry> Geometries(std::span<const MatchPhoto> photos,
-                                     const std::vector<std::pair<int, int>>& pairs,
-                                     const std::vector<CoarsePair>& coarse,
-                                     std::vector<std::optional<PairGeometry>> found,
-                                     const ViewGraph& graph, const MatchOptions& options,
-                                     PairJournal& journal, Progress& progress) {
+// What became of the part's pairs along epipolar lines.
+void Verify(std::span<const MatchPhoto> photos, const std::vector<std::pair<int, int>>& pairs,
+            const std::vector<CoarsePair>& coarse, const ViewGraph& graph, const Part& part,
+            const MatchOptions& options, PairJournal& journal, Progress& progress,
+            std::vector<std::optional<TriedPair>>& tried) {
   PhotoCache<RayFeatures> features(
       photos.size(),
       [&](int i) {
@@ -79,38 +101,75 @@ std::vector<PairGeometry> Geometries(std::span<const MatchPhoto> photos,
                       graph.cameras[static_cast<size_t>(photo.camera)]);
       },
       options.threads);
-  const std::vector<double> bytes = DescriptorBytes(photos, kAll);
-  progress.Stage("matching", static_cast<int>(pairs.size()));
-  std::atomic<int> done = static_cast<int>(found.size());
-  for (size_t begin = found.size(), end = begin; begin < pairs.size(); begin = end) {
-    end = BlockEnd(pairs, begin, bytes, options.descriptor_gb * kBytesPerGigabyte, kPairsPerBlock);
-    features.Require(std::span(pairs).subspan(begin, end - begin));
-    found.resize(end);
-    ParallelFor(static_cast<int>(begin), static_cast<int>(end), options.threads, [&](int k) {
-      progress.ThrowIfInterrupted();
-      const auto [a, b] = pairs[static_cast<size_t>(k)];
-      const auto knows = [&](int photo) -> bool {
-        return graph.focal_is_known[static_cast<size_t>(photos[static_cast<size_t>(photo)].camera)];
-      };
-      found[static_cast<size_t>(k)] =
-          GeometryOf(features[a], features[b], coarse[static_cast<size_t>(k)], knows(a) && knows(b),
-                     HashOf(options.seed, 2, a, b));
-      progress.Update(++done);
-    });
-    journal.AddGeometries(std::span(found).subspan(begin, end - begin));
+  const auto knows = [&](int photo) -> bool {
+    return graph.focal_is_known[static_cast<size_t>(photos[static_cast<size_t>(photo)].camera)];
+  };
+  const std::vector<int> missing = Missing(tried, part);
+  const size_t all = part.End(pairs.size()) - part.Begin(pairs.size());
+  progress.Stage("matching", static_cast<int>(all));
+  std::atomic<int> done = static_cast<int>(all - missing.size());
+  ForBlocks(pairs, missing, DescriptorBytes(photos, kAll), options,
+            [&](std::span<const std::pair<int, int>> block, std::span<const int> which) {
+              features.Require(block);
+              ParallelFor(0, static_cast<int>(which.size()), options.threads, [&](int i) {
+                progress.ThrowIfInterrupted();
+                const auto [a, b] = block[static_cast<size_t>(i)];
+                const auto k = static_cast<size_t>(which[static_cast<size_t>(i)]);
+                tried[k] =
+                    TriedPair{GeometryOf(features[a], features[b], coarse[k], knows(a) && knows(b),
+                                         HashOf(options.seed, 2, a, b))};
+                progress.Update(++done);
+              });
+              journal.AddGeometries(which, tried);
+            });
+}
+
+// All of them; throws Error where a part of the pairs is missing.
+std::vector<CoarsePair> AllOf(std::vector<std::optional<CoarsePair>>&& coarse) {
+  const auto missing = Missing(coarse, Part{});
+  if (!missing.empty()) {
+    throw Error(
+        fmt::format("matches: expected {} pairs that were compared, found {}; run all "
+                    "parts of the stage `matching` first",
+                    coarse.size(), coarse.size() - missing.size()));
   }
-  std::vector<PairGeometry> geometries;
-  for (auto& pair : found) {
-    if (pair) geometries.push_back(std::move(*pair));
+  std::vector<CoarsePair> all;
+  for (auto& pair : coarse) all.push_back(std::move(*pair));
+  return all;
+}
+
+// A part's own name among those of its journal.
+std::string NameOf(const std::optional<MatchPart>& part) {
+  if (!part || part->stage == MatchPart::Stage::kPairs) return "";
+  return fmt::format("{}_{}_of_{}",
+                     part->stage == MatchPart::Stage::kMatching ? "matching" : "verification",
+                     part->part.index, part->part.count);
+}
+
+// The pairs to be matched: chosen now, unless that was done before.
+std::vector<std::pair<int, int>> PairsOf(PairJournal::Content& kept,
+                                         std::span<const MatchPhoto> photos,
+                                         const MatchOptions& options, PairJournal& journal,
+                                         Progress& progress) {
+  if (!kept.pairs) {
+    if (options.part && options.part->stage != MatchPart::Stage::kPairs) {
+      throw Error(
+          "matches: expected pairs of photos that were chosen, found none; run the stage `pairs` "
+          "first");
+    }
+    kept.pairs = ChoosePairs(photos, options, progress);
+    journal.AddPairs(*kept.pairs);
+    kept.coarse.resize(kept.pairs->size());
+    kept.geometries.resize(kept.pairs->size());
   }
-  return geometries;
+  return std::move(*kept.pairs);
 }
 
 PairJournal JournalOf(std::span<const MatchPhoto> photos, const MatchOptions& options) {
   if (options.journal.empty()) return {};
   std::vector<size_t> counts;
   for (const MatchPhoto& photo : photos) counts.push_back(photo.features.keypoints.size());
-  return {options.journal, options.journal_inputs, counts};
+  return {options.journal, options.journal_inputs, counts, NameOf(options.part)};
 }
 
 }  // namespace
@@ -132,19 +191,24 @@ MatchResult MatchPhotos(std::span<const MatchPhoto> photos,
   }
   PairJournal journal = JournalOf(photos, options);
   PairJournal::Content kept = journal.TakeContent();
-  if (!kept.pairs) {
-    kept.pairs = ChoosePairs(photos, options, progress);
-    journal.AddPairs(*kept.pairs);
+  const auto pairs = PairsOf(kept, photos, options, journal, progress);
+  using Stage = MatchPart::Stage;
+  if (options.part && options.part->stage == Stage::kPairs) throw PartDone();
+  const Part part = options.part ? options.part->part : Part{};
+  if (!options.part || options.part->stage == Stage::kMatching) {
+    CoarseSearch(photos, pairs, part, options, journal, progress, kept.coarse);
+    if (options.part) throw PartDone();
   }
-  const auto& pairs = *kept.pairs;
-  const auto coarse =
-      CoarseSearch(photos, pairs, std::move(kept.coarse), options, journal, progress);
+  const std::vector<CoarsePair> coarse = AllOf(std::move(kept.coarse));
   for (size_t c = 0; c < options.lens_is_known.size(); ++c) {
     if (options.lens_is_known[c]) graph.focal_is_known[c] = true;
   }
   VoteOnCameras(photos, coarse, options, graph, result.notes);
-  graph.pairs = Geometries(photos, pairs, coarse, std::move(kept.geometries), graph, options,
-                           journal, progress);
+  Verify(photos, pairs, coarse, graph, part, options, journal, progress, kept.geometries);
+  if (options.part) throw PartDone();
+  for (auto& pair : kept.geometries) {
+    if (pair->geometry) graph.pairs.push_back(std::move(*pair->geometry));
+  }
   return result;
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "calib/sfm/view_graph.h"
+#include "dtr/base/part.h"
 #include "dtr/base/progress.h"
 
 namespace dtr::sfm {
@@ -21,6 +22,17 @@ struct MatchPhoto {
   int width_px = 0, height_px = 0;
   int camera = 0;  ///< index into the cameras
   Features features;
+};
+
+/// What of the work one of several processes does; all of them share a journal.
+struct MatchPart {
+  enum class Stage {
+    kPairs,         ///< which pairs are matched; the first, by one process
+    kMatching,      ///< the largest features of two photos
+    kVerification,  ///< relative poses, then all features; when all pairs went through kMatching
+  };
+  Stage stage = Stage::kPairs;
+  Part part;  ///< of the pairs
 };
 
 struct MatchOptions {
@@ -41,6 +53,8 @@ struct MatchOptions {
   /// result depends on) to go on with. Empty: nothing is kept.
   std::filesystem::path journal = {};
   std::string journal_inputs = {};
+  /// Does this alone and throws PartDone; needs a journal. Empty: everything.
+  std::optional<MatchPart> part = {};
   Progress* progress = nullptr;
 };
 
@@ -60,7 +74,8 @@ struct MatchResult {
 /// left out there.
 /// Deterministic: the same bytes for any number of threads. Photos without features get no pairs.
 /// Throws std::invalid_argument when numbers of things that belong together differ or an index is
-/// out of range, Interrupted when `progress` says so, Error where the journal cannot be written.
+/// out of range, Interrupted when `progress` says so, Error where the journal cannot be written or
+/// does not hold what a part needs.
 MatchResult MatchPhotos(std::span<const MatchPhoto> photos,
                         std::span<const calib::LensCamera> cameras,
                         const std::vector<bool>& focal_is_known, const MatchOptions& options);

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <type_traits>
 
 #include "dtr/base/durable.h"
+#include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/hash.h"
 
@@ -15,8 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// "dtr pairs 1", the hash of the inputs, an end of line.
-constexpr std::string_view kMagic = "dtr pairs 1 ";
+// "dtr pairs 2", the hash of the inputs, an end of line.
+constexpr std::string_view kMagic = "dtr pairs 2 ";
 constexpr size_t kHash = 64;
 // A record: its size in bytes and its hash, then a byte that says what follows.
 constexpr size_t kRecordHeader = sizeof(std::uint64_t) + kHash;
@@ -135,32 +135,89 @@ bool GetGeometry(Reader& reader, std::span<const size_t> features, const Two& ph
          pair.kind >= PairKind::kCalibrated && pair.kind <= PairKind::kRotation;
 }
 
-}  // namespace
+// A block of pairs, each with its number, into `all`; nothing of it where it does not fit.
+template <typename T, typename Get>
+bool GetBlock(Reader& reader, const std::vector<std::pair<int, int>>& pairs,
+              std::vector<std::optional<T>>& all, const Get& get) {
+  std::vector<std::pair<size_t, T>> block;
+  while (!reader.AtEnd()) {
+    std::int32_t k = 0;
+    if (!reader.Get(&k) || k < 0 || static_cast<size_t>(k) >= pairs.size()) return false;
+    const auto& [a, b] = pairs[static_cast<size_t>(k)];
+    auto& [number, value] = block.emplace_back(static_cast<size_t>(k), T{});
+    if (!get(Two{a, b}, value)) return false;
+  }
+  for (auto& [number, value] : block) all[number] = std::move(value);
+  return true;
+}
 
-PairJournal::PairJournal(fs::path file, const std::string& inputs, std::span<const size_t> features)
-    : file_(std::move(file)) {
-  std::uint64_t whole = 0;
-  if (std::ifstream in(file_, std::ios::binary | std::ios::ate); in) {
-    const auto size = static_cast<std::uint64_t>(std::max<std::streamoff>(0, in.tellg()));
-    in.seekg(0);
-    if (ReadHeader(in, inputs)) {
-      do {
-        whole = static_cast<std::uint64_t>(in.tellg());
-      } while (ReadRecord(in, size - whole, features));
+std::string Header(const std::string& inputs) {
+  return std::string(kMagic) + HashOfText(inputs) + '\n';
+}
+
+// FILE.PART of all parts, sorted.
+std::vector<fs::path> PartsOf(const fs::path& file) {
+  const std::string prefix = file.filename().string() + ".";
+  std::vector<fs::path> parts;
+  std::error_code error;
+  fs::directory_iterator entry(file.parent_path(), error);
+  for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    if (entry->path().filename().string().starts_with(prefix) && !IsTemporaryFile(entry->path())) {
+      parts.push_back(entry->path());
     }
   }
+  if (error) throw Error(file.parent_path().string() + ": cannot be listed: " + error.message());
+  std::sort(parts.begin(), parts.end());
+  return parts;
+}
+
+}  // namespace
+
+PairJournal::PairJournal(const fs::path& file, const std::string& inputs,
+                         std::span<const size_t> features, const std::string& part) {
+  file_ = part.empty() ? file : fs::path(file.string() + "." + part);
+  // The file first: without its pairs the parts' records mean nothing.
+  std::uint64_t whole = Read(file, inputs, features);
+  if (!part.empty()) whole = 0;
+  for (const fs::path& other : PartsOf(file)) {
+    const std::uint64_t read = Read(other, inputs, features);
+    if (other == file_) whole = read;
+  }
   if (whole == 0) {
-    WriteFileAtomically(file_, std::string(kMagic) + HashOfText(inputs) + '\n');
+    WriteFileAtomically(file_, Header(inputs));
   } else {
     // What comes next must not follow a part of a record.
     fs::resize_file(file_, whole);
   }
 }
 
-bool PairJournal::ReadHeader(std::istream& in, const std::string& inputs) {
-  const std::string expected = std::string(kMagic) + HashOfText(inputs) + '\n';
+void PairJournal::Remove(const fs::path& file) {
+  std::vector<fs::path> all = PartsOf(file);
+  all.push_back(file);
+  for (const fs::path& one : all) {
+    std::error_code error;
+    fs::remove(one, error);
+    if (error) throw Error(one.string() + ": cannot be removed: " + error.message());
+  }
+}
+
+// Takes over what the file holds and returns how many of its bytes are whole.
+std::uint64_t PairJournal::Read(const fs::path& file, const std::string& inputs,
+                                std::span<const size_t> features) {
+  std::ifstream in(file, std::ios::binary | std::ios::ate);
+  if (!in) return 0;
+  const auto size = static_cast<std::uint64_t>(std::max<std::streamoff>(0, in.tellg()));
+  in.seekg(0);
+  const std::string expected = Header(inputs);
   std::string header(expected.size(), '\0');
-  return in.read(header.data(), static_cast<std::streamsize>(header.size())) && header == expected;
+  if (!in.read(header.data(), static_cast<std::streamsize>(header.size())) || header != expected) {
+    return 0;
+  }
+  std::uint64_t whole = 0;
+  do {
+    whole = static_cast<std::uint64_t>(in.tellg());
+  } while (ReadRecord(in, size - whole, features));
+  return whole;
 }
 
 // False at the end of the file and of what fits together.
@@ -182,24 +239,23 @@ bool PairJournal::ReadRecord(std::istream& in, std::uint64_t left,
     if (content_.pairs) return false;
     std::vector<std::pair<int, int>> pairs;
     if (!GetPairs(reader, features.size(), &pairs) || !reader.AtEnd()) return false;
+    content_.coarse.resize(pairs.size());
+    content_.geometries.resize(pairs.size());
     content_.pairs = std::move(pairs);
     return true;
   }
-  if (!content_.pairs || (what != kCoarse && what != kGeometries)) return false;
-  std::vector<CoarsePair> coarse;
-  std::vector<std::optional<PairGeometry>> geometries;
-  size_t next = what == kCoarse ? content_.coarse.size() : content_.geometries.size();
-  for (; !reader.AtEnd(); ++next) {
-    if (next >= content_.pairs->size()) return false;
-    const Two photos{(*content_.pairs)[next].first, (*content_.pairs)[next].second};
-    const bool fits = what == kCoarse
-                          ? GetCoarse(reader, features, photos, &coarse.emplace_back())
-                          : GetGeometry(reader, features, photos, &geometries.emplace_back());
-    if (!fits) return false;
+  if (!content_.pairs) return false;
+  if (what == kCoarse) {
+    return GetBlock(reader, *content_.pairs, content_.coarse,
+                    [&](const Two& photos, CoarsePair& pair) {
+                      return GetCoarse(reader, features, photos, &pair);
+                    });
   }
-  std::move(coarse.begin(), coarse.end(), std::back_inserter(content_.coarse));
-  std::move(geometries.begin(), geometries.end(), std::back_inserter(content_.geometries));
-  return true;
+  return what == kGeometries &&
+         GetBlock(reader, *content_.pairs, content_.geometries,
+                  [&](const Two& photos, TriedPair& pair) {
+                    return GetGeometry(reader, features, photos, &pair.geometry);
+                  });
 }
 
 void PairJournal::AddPairs(std::span<const std::pair<int, int>> pairs) {
@@ -211,17 +267,24 @@ void PairJournal::AddPairs(std::span<const std::pair<int, int>> pairs) {
   AppendDurably(file_, writer.Record());
 }
 
-void PairJournal::AddCoarse(std::span<const CoarsePair> block) {
+void PairJournal::AddCoarse(std::span<const int> which,
+                            std::span<const std::optional<CoarsePair>> coarse) {
   if (file_.empty()) return;
   Writer writer(kCoarse);
-  for (const CoarsePair& pair : block) writer.PutAll(pair.matches);
+  for (const int k : which) {
+    writer.Put(static_cast<std::int32_t>(k));
+    writer.PutAll(coarse[static_cast<size_t>(k)]->matches);
+  }
   AppendDurably(file_, writer.Record());
 }
 
-void PairJournal::AddGeometries(std::span<const std::optional<PairGeometry>> block) {
+void PairJournal::AddGeometries(std::span<const int> which,
+                                std::span<const std::optional<TriedPair>> geometries) {
   if (file_.empty()) return;
   Writer writer(kGeometries);
-  for (const std::optional<PairGeometry>& pair : block) {
+  for (const int k : which) {
+    const std::optional<PairGeometry>& pair = geometries[static_cast<size_t>(k)]->geometry;
+    writer.Put(static_cast<std::int32_t>(k));
     writer.Put(static_cast<std::uint8_t>(pair ? 1 : 0));
     if (!pair) continue;
     writer.Put(pair->kind);

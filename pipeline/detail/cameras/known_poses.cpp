@@ -112,8 +112,7 @@ CalibratedPhotos Triangulated(const Given& given, const capture::Capture& captur
     if (is_source) source_photos.photos.push_back(photo);
   }
   RequireSharedNames(sources.size(), options.poses, given.first, capture);
-  capture::PrepareSfmImages(source_photos, workspace / "photos", 0, options.threads,
-                            options.memory_gb, progress);
+  PreparePhotos(source_photos, options, workspace / "photos", progress);
   CalibratedPhotos calibrated;
   calibrated.unit = given.unit;
   calibrated.world_origin = given.world_origin;

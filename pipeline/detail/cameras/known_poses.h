@@ -20,6 +20,12 @@ std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
                                              const std::filesystem::path& folder);
 colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options);
 
+/// Whether other processes work in the folder of structure from motion at the same time.
+bool IsShared(const std::optional<colmap::SfmPart>& part);
+/// capture::PrepareSfmImages into `folder`, unless a process before did that for several.
+void PreparePhotos(const capture::Capture& photos, const CalibrateOptions& options,
+                   const std::filesystem::path& folder, Progress& progress);
+
 /// Cameras of a file, with lines about it that are worth telling.
 struct PosesFile {
   io::CameraList list;

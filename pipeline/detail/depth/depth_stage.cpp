@@ -162,6 +162,44 @@ stereo::QualitySettings WithinBudget(std::span<const stereo::StereoView> views,
       record, progress);
 }
 
+// What depth ranges are found from.
+struct RangeInputs {
+  std::span<const stereo::StereoView> views;
+  const SparseScene& scene;
+  const stereo::Engine& engine;
+  const DepthStageOptions& options;
+};
+
+// Depth ranges are found once: a later run, and processes with a part, take those of the first.
+void KeepRanges(const RangeInputs& in, const std::function<bool(int)>& is_done, PlaneFiles& planes,
+                stereo::DepthMapsOptions& depth, Progress& progress) {
+  if (!in.options.ranges.empty()) return;  // given
+  const auto count = static_cast<int>(in.views.size());
+  bool all_done = true;
+  for (int view = 0; view < count && all_done; ++view) all_done = is_done(view);
+  if (all_done) return;
+  auto ranges = planes.LoadRanges(in.views.size());
+  const bool ranges_alone = in.options.part && in.options.part->ranges_alone;
+  if (!ranges && in.options.part && !ranges_alone) {
+    throw Error(
+        "depth: expected depth ranges that were found, found none; run the stage `ranges` "
+        "first");
+  }
+  if (!ranges) {
+    ranges = stereo::WidenedRanges(in.views, in.scene, in.engine, depth, progress);
+    planes.SaveRanges(*ranges);
+  }
+  if (ranges_alone) throw PartDone();
+  depth.given_ranges = std::move(*ranges);
+  depth.widenings = 0;
+}
+
+// Processes that share the work have folders of their own for what they throw away.
+std::string EstimatesOf(const std::optional<DepthStagePart>& part) {
+  if (!part) return "estimates";
+  return fmt::format("estimates_{}_of_{}", part->depth.part.index, part->depth.part.count);
+}
+
 }  // namespace
 
 void StoreImage(View& view, LengthUnit unit, io::SetWriter& writer) {
@@ -237,17 +275,19 @@ DepthStageResult DepthStage(DtrSet& set, const SparseScene& sparse, const DepthC
   depth_options.engine.memory_gb = choice.memory_gb.value_or(kDefaultMemoryGb) / 2;
   const std::string made_from = HashOf(sources.stereo, scene);
   PlaneFiles planes(work / "planes", made_from);
-  EstimateFiles estimates(work / "estimates");
   const NormalFiles normals(work, options.normals);
+  const auto is_done = [&](int source) {
+    const View& view = view_of(source);
+    return view.depth_file.has_value() && normals.Has(view);
+  };
+  EstimateFiles estimates(work / EstimatesOf(options.part));
+  if (options.part) depth_options.part = options.part->depth;
   depth_options.planes = &planes;
   depth_options.estimates = &estimates;
   ComputeWithin(choice.memory_gb, depth_options, progress, [&] {
+    KeepRanges({sources.stereo, scene, *engine, options}, is_done, planes, depth_options, progress);
     stereo::ComputeDepthMaps(
-        sources.stereo, scene, *engine, depth_options, progress,
-        [&](int source) {
-          const View& view = view_of(source);
-          return view.depth_file.has_value() && normals.Has(view);
-        },
+        sources.stereo, scene, *engine, depth_options, progress, is_done,
         [&](int source, stereo::DepthEstimate&& estimate, const stereo::DepthRange& range) {
           View& view = view_of(source);
           if (!options.ranges.empty()) StoreWithin(range, view);
@@ -257,6 +297,7 @@ DepthStageResult DepthStage(DtrSet& set, const SparseScene& sparse, const DepthC
           WriteDepth(view, std::move(estimate), set.unit, writer);
         });
   });
+  if (options.part) throw PartDone();
   if (options.gains) SetGains(set, scene, writer.folder(), options.threads, progress);
   for (const int index : sources.indices) normals.Deliver(views[static_cast<size_t>(index)]);
   if (const std::string codings = SayDepthCodings(views); !codings.empty()) progress.Note(codings);

@@ -12,10 +12,18 @@
 #include "dtr/types/sparse_scene.h"
 #include "pipeline/depth_settings.h"
 #include "pipeline/detail/depth/depth_priors.h"
+#include "stereo/depth_maps.h"
 #include "stereo/engine.h"
 #include "stereo/time_step.h"
 
 namespace dtr::pipeline {
+
+/// Of the depth stage what one of several processes does.
+struct DepthStagePart {
+  /// Depth ranges, widened where they prove too narrow: one process, before all others.
+  bool ranges_alone = false;
+  stereo::DepthPart depth;  ///< else this
+};
 
 struct DepthStageOptions {
   int threads = 0;
@@ -32,6 +40,8 @@ struct DepthStageOptions {
   /// What other time steps say of the source views; empty: nothing.
   std::vector<stereo::TimeStepSource> time_steps = {};
   bool gains = true;  ///< the views' gains are estimated
+  /// Does this alone and throws PartDone; Error where what it needs is missing. Empty: everything.
+  std::optional<DepthStagePart> part = {};
 };
 
 /// What became of the depth stage.

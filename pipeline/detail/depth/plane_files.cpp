@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -12,6 +14,9 @@ namespace dtr::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr char kRanges[] = "ranges.json";
+constexpr std::uintmax_t kRangeBytes = 64;  // of one range as text, at most
 
 void MakeFolder(const fs::path& folder) {
   std::error_code error;
@@ -77,6 +82,31 @@ void PlaneFiles::Drop(int round) {
     if (entry->path().filename().string().starts_with(prefix)) Remove(entry->path());
   }
   if (error) throw Error(folder_.string() + ": cannot be listed: " + error.message());
+}
+
+void PlaneFiles::SaveRanges(std::span<const stereo::DepthRange> ranges) {
+  auto json = nlohmann::json::array();
+  for (const stereo::DepthRange& range : ranges) json.push_back({range.near_z, range.far_z});
+  WriteFileAtomically(folder_ / kRanges, json.dump() + "\n");
+}
+
+std::optional<std::vector<stereo::DepthRange>> PlaneFiles::LoadRanges(size_t views) const {
+  if (!Exists(folder_ / kRanges)) return std::nullopt;
+  try {
+    const auto json = nlohmann::json::parse(ReadFile(folder_ / kRanges, kRangeBytes * (views + 1)));
+    if (!json.is_array() || json.size() != views) return std::nullopt;
+    std::vector<stereo::DepthRange> ranges;
+    for (const auto& pair : json) {
+      ranges.push_back({pair.at(0).get<double>(), pair.at(1).get<double>()});
+      const auto& [near_z, far_z] = ranges.back();
+      if (!(near_z > 0) || !(far_z > near_z) || !std::isfinite(far_z)) return std::nullopt;
+    }
+    return ranges;
+  } catch (const Error&) {
+    return std::nullopt;  // a damaged checkpoint costs time, never the job
+  } catch (const nlohmann::json::exception&) {
+    return std::nullopt;
+  }
 }
 
 EstimateFiles::EstimateFiles(const fs::path& folder) : folder_(folder) {

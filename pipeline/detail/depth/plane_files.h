@@ -1,8 +1,12 @@
 // pipeline/detail/depth/plane_files.h -- what a run keeps between its steps, as files.
 #pragma once
 #include <filesystem>
+#include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
+#include "stereo/engine.h"
 #include "stereo/plane_map.h"
 #include "stereo/view_paging.h"
 
@@ -21,6 +25,11 @@ class PlaneFiles final : public stereo::PlaneMapStore {
   std::shared_ptr<const stereo::PlaneMap> Load(int round, int view) override;
   void Save(int round, int view, stereo::PlaneMap&& map) override;
   void Drop(int round) override;
+
+  /// The depth ranges that the planes lie in, which are kept beside them.
+  void SaveRanges(std::span<const stereo::DepthRange> ranges);
+  /// Nothing where there are none of so many views, or none that can be.
+  std::optional<std::vector<stereo::DepthRange>> LoadRanges(size_t views) const;
 
  private:
   std::filesystem::path File(int round, int view) const;

@@ -72,9 +72,11 @@ std::vector<View> UndistortPhotos(const capture::Capture& capture,
   if (undistorted) progress.Note("undistortion left out: no camera has distortion");
   const auto stabilised = StabilisedLenses(capture, held_out, model);
   progress.Stage(undistorted ? "reading photos" : "undistorting",
-                 static_cast<int>(registered.size()));
+                 static_cast<int>(options.part.End(registered.size()) -
+                                  options.part.Begin(registered.size())));
 
   std::vector<View> views;
+  int done = 0;
   for (size_t i = 0; i < capture.photos.size(); ++i) {
     const capture::Photo& photo = capture.photos[i];
     const auto found = registered.find(photo.name);
@@ -89,7 +91,8 @@ std::vector<View> UndistortPhotos(const capture::Capture& capture,
     view.role = held_out[i] ? ViewRole::kHeldOut : ViewRole::kSource;
     view.camera = calib::ShrunkCamera(onto, options.max_size_px);
     view.cam_from_world = found->second->cam_from_world;
-    if (!writer.RestoreView(view)) {
+    const bool is_ours = options.part.Has(views.size(), registered.size());
+    if (is_ours && !writer.RestoreView(view)) {
       const capture::PhotoPixels pixels = capture::ReadPhotoAndMask(photo);
       calib::UndistortedPhoto flat = calib::Undistort(pixels.image, pixels.mask, lens, onto,
                                                       options.max_size_px, options.threads);
@@ -100,7 +103,7 @@ std::vector<View> UndistortPhotos(const capture::Capture& capture,
       view.mask = {};
     }
     views.push_back(std::move(view));
-    progress.Update(static_cast<int>(views.size()));
+    if (is_ours) progress.Update(++done);
   }
   return views;
 }

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "capture/photo.h"
+#include "dtr/base/part.h"
 #include "dtr/base/progress.h"
 #include "dtr/io/set_io.h"
 #include "dtr/types/dtr_set.h"
@@ -13,6 +14,7 @@ namespace dtr::pipeline {
 struct UndistortOptions {
   int max_size_px = 0;  ///< long side of the images; 0: full size
   int threads = 0;      ///< 0: all cores
+  Part part = {};       ///< of the views: the others are not written, and have no files
 };
 
 /// Views of the registered photos, in the photos' order, on the grid that calib::Undistort gives

@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "calib/sfm/matching/photo_blocks.h"
+#include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "tests/calib/sfm/matching/match_world.h"
 #include "tests/support/test_data.h"
@@ -165,8 +166,10 @@ TEST(PairJournal, OtherInputsAndOtherFeaturesCountForNothing) {
   const auto write = [&] {
     PairJournal journal(folder / "journal", "inputs", features);
     journal.AddPairs(pairs);
-    journal.AddCoarse(std::vector<CoarsePair>{{0, 1, {{3, 8, 0.5F}}}, {0, 2, {}}});
-    journal.AddGeometries(std::vector<std::optional<PairGeometry>>{std::nullopt});
+    const std::vector<std::optional<CoarsePair>> coarse = {
+        CoarsePair{0, 1, {{3, 8, 0.5F}}}, {}, CoarsePair{1, 2, {}}};
+    journal.AddCoarse(std::vector{0, 2}, coarse);
+    journal.AddGeometries(std::vector{1}, std::vector<std::optional<TriedPair>>{{}, TriedPair{}});
   };
   const auto read = [&](const std::string& inputs, const std::vector<size_t>& counts) {
     return PairJournal(folder / "journal", inputs, counts).TakeContent();
@@ -174,20 +177,72 @@ TEST(PairJournal, OtherInputsAndOtherFeaturesCountForNothing) {
   write();
   PairJournal::Content content = read("inputs", features);
   EXPECT_EQ(content.pairs, pairs);
-  ASSERT_EQ(content.coarse.size(), 2u);
-  EXPECT_EQ(content.coarse[0].b, 1);
-  EXPECT_EQ(content.coarse[0].matches.at(0).b, 8);
-  EXPECT_EQ(content.geometries.size(), 1u);
+  ASSERT_EQ(content.coarse.size(), 3u);
+  ASSERT_TRUE(content.coarse[0] && !content.coarse[1] && content.coarse[2]);
+  EXPECT_EQ(content.coarse[0]->b, 1);
+  EXPECT_EQ(content.coarse[0]->matches.at(0).b, 8);
+  ASSERT_EQ(content.geometries.size(), 3u);
+  EXPECT_TRUE(!content.geometries[0] && content.geometries[1] && !content.geometries[2]);
   EXPECT_TRUE(read("inputs", {9, 9, 9, 9}).pairs);
   content = read("inputs", {9, 8, 9});
   EXPECT_TRUE(content.pairs);
-  EXPECT_TRUE(content.coarse.empty()) << "photo 1 has no feature 8";
+  EXPECT_FALSE(content.coarse[0] || content.coarse[2]) << "photo 1 has no feature 8";
   std::filesystem::remove(folder / "journal");
   write();
   EXPECT_FALSE(read("inputs", {9, 9}).pairs) << "there is no photo 2";
   std::filesystem::remove(folder / "journal");
   write();
   EXPECT_FALSE(read("other inputs", features).pairs);
+}
+
+// Runs one part; the result is in the journal.
+void RunPart(const OfFiles& files, MatchOptions options, MatchPart::Stage stage, int index,
+             int count) {
+  options.part = {stage, {index, count}};
+  EXPECT_THROW(files.Run(options), PartDone);
+}
+
+TEST(MatchInParts, PartsInAnyOrderGiveWhatOneProcessGives) {
+  using Stage = MatchPart::Stage;
+  OfFiles files;
+  const testing::TemporaryFolder folder;
+  MatchOptions options = files.Options();
+  options.journal = folder / "journal";
+  options.journal_inputs = "inputs";
+  RunPart(files, options, Stage::kPairs, 0, 1);
+  for (const int index : {2, 0, 1}) RunPart(files, options, Stage::kMatching, index, 3);
+  // Parts of another number overlap with these and do them no harm.
+  RunPart(files, options, Stage::kMatching, 1, 2);
+  for (const int index : {3, 1, 0, 2}) RunPart(files, options, Stage::kVerification, index, 4);
+  files.TakeLoads();
+  ExpectSame(files.Run(options).graph, files.InMemory().graph);
+  EXPECT_EQ(files.TakeLoads(), 0) << "all of it is in the parts' journals";
+  PairJournal::Remove(options.journal);
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+TEST(MatchInParts, WhatAPartNeedsAndNobodyDidIsNamed) {
+  using Stage = MatchPart::Stage;
+  OfFiles files;
+  const testing::TemporaryFolder folder;
+  MatchOptions options = files.Options();
+  options.journal = folder / "journal";
+  options.journal_inputs = "inputs";
+  const auto message = [&](Stage stage) {
+    options.part = {stage, {0, 2}};
+    try {
+      files.Run(options);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_NE(message(Stage::kMatching).find("run the stage `pairs` first"), std::string::npos);
+  RunPart(files, options, Stage::kPairs, 0, 1);
+  RunPart(files, options, Stage::kMatching, 0, 2);
+  EXPECT_EQ(message(Stage::kVerification),
+            "matches: expected 10 pairs that were compared, found 5; run all parts of the stage "
+            "`matching` first");
 }
 
 }  // namespace
