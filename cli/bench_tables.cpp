@@ -127,7 +127,8 @@ void SayWeightTable(const eval::BenchReport& report, const eval::BenchMachine& m
   }
   console.Say("");
   console.Say(
-      "dB: whole frame, holes filled and edges smoothed, * the best of its method and number of views; seen: dB on "
+      "dB: whole frame, holes filled and edges smoothed, * the best of its method and number of "
+      "views; seen: dB on "
       "pixels that some view saw, and their share; CPU ms: drawing alone");
 }
 

@@ -62,6 +62,7 @@ void AddMemoryOption(CLI::App& command, double& memory_gb, const std::string& de
 
 // One function per command, each in commands/NAME.cpp.
 void AddBuildCommand(CLI::App& app);
+void AddBatchCommand(CLI::App& app);
 void AddCaptureCommand(CLI::App& app);
 void AddCalibrateCommand(CLI::App& app);
 void AddCalibrateBoardCommand(CLI::App& calibrate);

@@ -25,6 +25,7 @@ int Run(int argc, char** argv) {
   app.set_version_flag("--version", DTR_VERSION);
   app.require_subcommand(1);
   AddCallableCommands(app);
+  AddBatchCommand(app);
 #ifdef DTR_WITH_WINDOWS
   AddViewCommand(app);
 #endif

@@ -27,8 +27,8 @@ struct DepthPriorReport {
   std::vector<std::string> lines;  ///< what was logged
 };
 
-/// JSON object: photos, maps, points, scale, scale_sigma, noise, outliers, divided_by, by_distance[],
-/// views[].
+/// JSON object: photos, maps, points, scale, scale_sigma, noise, outliers, divided_by,
+/// by_distance[], views[].
 std::string ToJson(const DepthPriorReport& report);
 
 }  // namespace dtr::pipeline

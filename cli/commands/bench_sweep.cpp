@@ -76,7 +76,8 @@ class RenderStage final : public Measurable {
     const std::vector<std::string> names = sweep_.Cameras();
     return fmt::format(
         "seen from {} ({}); frames timed at {}; median of {} frames after an untimed one, mean "
-        "over the cameras; PSNR over whole frames, holes filled and edges smoothed, at the photo's own size",
+        "over the cameras; PSNR over whole frames, holes filled and edges smoothed, at the photo's "
+        "own size",
         names.size() == 1 ? "1 photo" : fmt::format("{} photos", names.size()),
         fmt::join(names, ", "), request_.size.empty() ? "the photo's size" : request_.size,
         request_.bench.repeats);

@@ -1,0 +1,28 @@
+// cli/build_arguments.h -- the options of `dtr build`, which `dtr batch` takes too.
+#pragma once
+#include <string>
+
+#include "cli/command.h"
+#include "cli/metre_options.h"
+#include "pipeline/build.h"
+#include "pipeline/build_dynamic.h"
+
+namespace dtr::cli {
+
+struct BuildArguments {
+  pipeline::BuildOptions options;
+  bool is_dynamic = false;
+  std::string temporal = "on";
+  std::string stage, part = "1/1";
+  pipeline::DynamicOptions dynamic;
+  MetreWords metre_words;
+};
+
+/// Declares them; `arguments` must outlive the command.
+void AddBuildOptions(CLI::App& command, BuildArguments& arguments);
+
+/// When the command line was read: brings what the words mean into arguments.options and .dynamic.
+/// Throws UsageError.
+void FinishBuildArguments(const CommonOptions& common, BuildArguments& arguments);
+
+}  // namespace dtr::cli

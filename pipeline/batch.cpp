@@ -1,0 +1,209 @@
+#include "pipeline/batch.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "capture/ingest.h"
+#include "capture/store.h"
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+#include "dtr/io/set_io.h"
+#include "pipeline/capture.h"
+#include "pipeline/detail/batch/batch_files.h"
+#include "pipeline/detail/batch/local.h"
+#include "pipeline/detail/batch/slurm.h"
+#include "pipeline/detail/reports/text.h"
+
+namespace dtr::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+// More parts than photos would only begin and end.
+int PartsFor(const BatchOptions& options) {
+  int photos = 0;
+  if (fs::is_directory(options.build.photos)) {
+    photos = capture::ContentsOf(options.build.photos, true).photos;
+  }
+  return photos > 0 ? std::min(options.array_size, photos) : options.array_size;
+}
+
+Batch Planned(const BatchOptions& options) {
+  Batch batch;
+  batch.set = WithoutTrailingSlash(fs::absolute(options.build.output).lexically_normal());
+  batch.program = options.program;
+  batch.directory = fs::absolute(options.directory);
+  batch.words = options.words;
+  const int parts = PartsFor(options);
+  for (const BuildStage& stage : BuildStages(options.build)) {
+    batch.stages.push_back({stage.name, stage.has_parts ? parts : 1, false});
+  }
+  batch.stages.push_back({kLastStage, 1, true});
+  batch.local = options.local;
+  batch.threads = options.threads;
+  batch.slurm = options.slurm;
+  batch.memory_gb = options.build.depth.memory_gb.value_or(kDefaultMemoryGb);
+  return batch;
+}
+
+// A batch that was begun keeps its parts; what else is asked for may be new.
+void KeepParts(const Batch& before, Batch& batch) {
+  if (before.words != batch.words || before.directory != batch.directory) {
+    throw UsageError(
+        fmt::format("{}: expected a batch of the same words, found one of others; end it with dtr "
+                    "batch resume, or delete it and {}.partial",
+                    BatchFolder(batch.set).string(), batch.set.string()));
+  }
+  batch.stages = before.stages;
+  batch.jobs = before.jobs;
+}
+
+void RequireNoneUnderWay(const Batch& batch) {
+  if (batch.jobs.empty()) return;
+  if (const auto queued = QueuedParts(batch); !queued.empty()) {
+    throw UsageError(fmt::format(
+        "{}: {} of its parts are waiting or running; dtr batch status says how far they are, dtr "
+        "batch cancel ends them",
+        BatchFolder(batch.set).string(), queued.size()));
+  }
+}
+
+StageState StateOf(const Batch& batch, const BatchStage& stage,
+                   const std::vector<QueuedPart>& queued) {
+  StageState state{.stage = stage.name, .parts = stage.parts};
+  if (stage.is_last) {
+    state.done = MissingParts(batch, stage).empty();
+  } else {
+    for (int part = 0; part < stage.parts; ++part) {
+      const auto done = FindDonePart(batch.set, {stage.name, {part, stage.parts}});
+      if (!done) continue;
+      ++state.done;
+      state.cpu_s += done->cpu_s;
+      state.wall_s += done->wall_s;
+    }
+  }
+  for (const QueuedPart& part : queued) {
+    if (part.stage == stage.name) ++(part.is_running ? state.running : state.waiting);
+  }
+  return state;
+}
+
+// Where the output of a part went that Slurm ran.
+fs::path SlurmLogOf(const Batch& batch, const BatchStage& stage, const BatchJobs& jobs, int part) {
+  if (stage.parts == 1) return LogOf(batch, stage, part);
+  return BatchFolder(batch.set) / "logs" /
+         fmt::format("{}_slurm_{}_{}.log", stage.name, jobs.id, part + 1 - jobs.offset);
+}
+
+// Parts that were submitted, are not done and are in no queue. Those that waited for one of them
+// were ended by Slurm, and have no log.
+std::vector<std::string> FailedOf(const Batch& batch, const std::vector<QueuedPart>& queued) {
+  std::vector<std::string> failed;
+  for (const BatchJobs& jobs : batch.jobs) {
+    const auto stage = std::find_if(batch.stages.begin(), batch.stages.end(),
+                                    [&](const BatchStage& one) { return one.name == jobs.stage; });
+    if (stage == batch.stages.end()) continue;
+    const std::vector<int> missing = MissingParts(batch, *stage);
+    for (const int part : jobs.parts) {
+      const bool is_missing = std::find(missing.begin(), missing.end(), part) != missing.end();
+      const bool is_queued = std::any_of(queued.begin(), queued.end(), [&](const QueuedPart& q) {
+        return q.stage == stage->name && q.part == part;
+      });
+      const fs::path log = SlurmLogOf(batch, *stage, jobs, part);
+      if (!is_missing || is_queued || !fs::exists(log)) continue;
+      failed.push_back(fmt::format("{}: ended without being done; it said: {}; see {}",
+                                   NameOf(BuildPart{stage->name, {part, stage->parts}}),
+                                   LastLine(log), log.string()));
+    }
+  }
+  return failed;
+}
+
+BatchState StateOf(const Batch& batch) {
+  const auto queued = QueuedParts(batch);
+  BatchState state;
+  state.set = batch.set;
+  for (const BatchStage& stage : batch.stages) {
+    state.stages.push_back(StateOf(batch, stage, queued));
+  }
+  state.finished = state.stages.back().done > 0;
+  // The work folder, which says what was done, went with the end.
+  if (state.finished) {
+    for (StageState& stage : state.stages) stage.done = stage.parts;
+  } else {
+    state.failed = FailedOf(batch, queued);
+  }
+  for (const BatchJobs& jobs : batch.jobs) state.jobs.push_back(jobs.id);
+  return state;
+}
+
+}  // namespace
+
+std::string ToJson(const BatchState& state) {
+  nlohmann::ordered_json json = {{"set", state.set.string()}, {"finished", state.finished}};
+  json["stages"] = nlohmann::ordered_json::array();
+  for (const StageState& stage : state.stages) {
+    json["stages"].push_back({{"stage", stage.stage},
+                              {"parts", stage.parts},
+                              {"done", stage.done},
+                              {"waiting", stage.waiting},
+                              {"running", stage.running},
+                              {"cpu_s", stage.cpu_s},
+                              {"wall_s", stage.wall_s}});
+  }
+  json["failed"] = state.failed;
+  json["jobs"] = state.jobs;
+  return Text(json);
+}
+
+BatchState RunBatch(const BatchOptions& options, const std::function<void(const std::string&)>& say,
+                    Progress& progress) {
+  Batch batch = Planned(options);
+  if (HasBatch(batch.set)) {
+    KeepParts(LoadBatch(batch.set), batch);
+    RequireNoneUnderWay(batch);
+  } else {
+    io::SetWriter::RequireTarget(options.build.output, options.build.force);
+  }
+  if (options.local > 0) {
+    if (options.dry_run) {
+      for (const BatchStage& stage : batch.stages) {
+        say(fmt::format("{}: {} parts", stage.name, stage.parts));
+      }
+      return {};
+    }
+    batch.jobs.clear();
+    WriteBatch(batch);
+    RunLocally(batch, progress);
+  } else {
+    if (!options.dry_run) WriteBatch(batch);
+    SubmitToSlurm(batch, options.dry_run, say);
+    if (options.dry_run) return {};
+  }
+  return StateOf(batch);
+}
+
+BatchOptions ReadBatch(const fs::path& set) {
+  const Batch batch = LoadBatch(set);
+  BatchOptions options;
+  options.program = batch.program;
+  options.words = batch.words;
+  options.directory = batch.directory;
+  options.local = batch.local;
+  options.threads = batch.threads;
+  options.slurm = batch.slurm;
+  return options;
+}
+
+BatchState StateOfBatch(const fs::path& set) { return StateOf(LoadBatch(set)); }
+
+int CancelBatch(const fs::path& set) {
+  const Batch batch = LoadBatch(set);
+  const auto queued = QueuedParts(batch);
+  if (!queued.empty()) CancelJobs(batch);
+  return static_cast<int>(queued.size());
+}
+
+}  // namespace dtr::pipeline

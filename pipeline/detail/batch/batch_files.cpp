@@ -1,0 +1,143 @@
+#include "pipeline/detail/batch/batch_files.h"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+
+namespace dtr::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr char kFile[] = "batch.json";
+constexpr std::uintmax_t kLargestFileBytes = 64u << 20;
+
+Json ToJson(const Batch& batch) {
+  Json stages = Json::array(), jobs = Json::array();
+  for (const BatchStage& stage : batch.stages) {
+    stages.push_back({{"stage", stage.name}, {"parts", stage.parts}});
+  }
+  for (const BatchJobs& array : batch.jobs) {
+    jobs.push_back({{"id", array.id},
+                    {"stage", array.stage},
+                    {"offset", array.offset},
+                    {"parts", array.parts}});
+  }
+  const SlurmOptions& slurm = batch.slurm;
+  return {{"tool_version", DTR_VERSION},
+          {"set", batch.set.string()},
+          {"program", batch.program.string()},
+          {"directory", batch.directory.string()},
+          {"words", batch.words},
+          {"stages", stages},
+          {"local", batch.local},
+          {"threads", batch.threads},
+          {"memory_gb", batch.memory_gb},
+          {"slurm",
+           {{"partition", slurm.partition},
+            {"account", slurm.account},
+            {"time", slurm.time},
+            {"cpus_per_task", slurm.cpus_per_task}}},
+          {"jobs", jobs}};
+}
+
+Batch FromJson(const Json& json) {
+  constexpr int kMaxParts = 1 << 20;
+  Batch batch;
+  batch.set = json.at("set").get<std::string>();
+  batch.program = json.at("program").get<std::string>();
+  batch.directory = json.at("directory").get<std::string>();
+  batch.words = json.at("words").get<std::vector<std::string>>();
+  for (const Json& stage : json.at("stages")) {
+    BatchStage& read = batch.stages.emplace_back();
+    read.name = stage.at("stage").get<std::string>();
+    read.parts = stage.at("parts").get<int>();
+    read.is_last = read.name == kLastStage;
+    if (read.parts < 1 || read.parts > kMaxParts) throw Error("a number of parts that cannot be");
+  }
+  batch.local = json.at("local").get<int>();
+  batch.threads = json.at("threads").get<int>();
+  batch.memory_gb = json.at("memory_gb").get<double>();
+  const Json& slurm = json.at("slurm");
+  batch.slurm = {slurm.at("partition").get<std::string>(), slurm.at("account").get<std::string>(),
+                 slurm.at("time").get<std::string>(), slurm.at("cpus_per_task").get<int>()};
+  for (const Json& jobs : json.at("jobs")) {
+    batch.jobs.push_back({jobs.at("id").get<std::string>(), jobs.at("stage").get<std::string>(),
+                          jobs.at("offset").get<int>(), jobs.at("parts").get<std::vector<int>>()});
+  }
+  return batch;
+}
+
+}  // namespace
+
+fs::path BatchFolder(const fs::path& set) {
+  return WithoutTrailingSlash(fs::absolute(set).lexically_normal()).string() + ".batch";
+}
+
+fs::path LogOf(const Batch& batch, const BatchStage& stage, int part) {
+  return BatchFolder(batch.set) / "logs" / fmt::format("{}_{}.log", stage.name, part + 1);
+}
+
+bool HasBatch(const fs::path& set) { return fs::exists(BatchFolder(set) / kFile); }
+
+void WriteBatch(const Batch& batch) {
+  const fs::path folder = BatchFolder(batch.set);
+  std::error_code error;
+  fs::create_directories(folder / "logs", error);
+  if (error) throw Error(folder.string() + ": cannot be made: " + error.message());
+  WriteFileAtomically(folder / kFile,
+                      ToJson(batch).dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+Batch LoadBatch(const fs::path& set) {
+  const fs::path file = BatchFolder(set) / kFile;
+  if (!HasBatch(set)) {
+    throw Error(file.string() + ": expected a batch of that set, found none; dtr batch begins one");
+  }
+  try {
+    return FromJson(Json::parse(ReadFile(file, kLargestFileBytes)));
+  } catch (const Json::exception& error) {
+    throw Error(
+        fmt::format("{}: expected what dtr batch writes, found something else ({}); delete "
+                    "the folder and begin the batch again, what was built stays",
+                    file.string(), error.what()));
+  }
+}
+
+std::vector<int> MissingParts(const Batch& batch, const BatchStage& stage) {
+  if (stage.is_last) {
+    return fs::exists(batch.set / "set.json") ? std::vector<int>() : std::vector<int>{0};
+  }
+  std::vector<int> missing;
+  for (int part = 0; part < stage.parts; ++part) {
+    if (!FindDonePart(batch.set, {stage.name, {part, stage.parts}})) missing.push_back(part);
+  }
+  return missing;
+}
+
+std::vector<std::string> CommandOf(const Batch& batch, const BatchStage& stage, int part) {
+  std::vector<std::string> words = {batch.program.string(), "build"};
+  words.insert(words.end(), batch.words.begin(), batch.words.end());
+  if (stage.is_last) return words;
+  words.insert(words.end(), {"--stage", stage.name});
+  if (stage.parts > 1) {
+    words.insert(words.end(), {"--part", fmt::format("{}/{}", part + 1, stage.parts)});
+  }
+  return words;
+}
+
+std::string LastLine(const fs::path& log) {
+  std::ifstream in(log);
+  std::string line, last;
+  while (std::getline(in, line)) {
+    if (line.find_first_not_of(" \t\r") != std::string::npos) last = line;
+  }
+  return last;
+}
+
+}  // namespace dtr::pipeline
