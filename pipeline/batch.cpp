@@ -113,9 +113,9 @@ std::vector<std::string> FailedOf(const Batch& batch, const std::vector<QueuedPa
       });
       const fs::path log = SlurmLogOf(batch, *stage, jobs, part);
       if (!is_missing || is_queued || !fs::exists(log)) continue;
-      failed.push_back(fmt::format("{}: ended without being done; it said: {}; see {}",
+      failed.push_back(fmt::format("{}: ended without being done; {}",
                                    NameOf(BuildPart{stage->name, {part, stage->parts}}),
-                                   LastLine(log), log.string()));
+                                   LastWords(log)));
     }
   }
   return failed;

@@ -110,7 +110,11 @@ int Run(const Context& context, const BatchArguments& arguments) {
   const auto say = [&](const std::string& line) { context.console.Say(line); };
   const pipeline::BatchState state = pipeline::RunBatch(arguments.options, say, context.console);
   if (arguments.options.dry_run) return kDone;
-  SayState(state, context.console);
+  if (state.finished) {
+    SayState(state, context.console);
+  } else {
+    context.console.Say(fmt::format("dtr batch status {} says how far it is", state.set.string()));
+  }
   context.EmitJson(pipeline::ToJson(state));
   return kDone;
 }

@@ -131,13 +131,14 @@ std::vector<std::string> CommandOf(const Batch& batch, const BatchStage& stage, 
   return words;
 }
 
-std::string LastLine(const fs::path& log) {
+std::string LastWords(const fs::path& log) {
   std::ifstream in(log);
   std::string line, last;
   while (std::getline(in, line)) {
     if (line.find_first_not_of(" \t\r") != std::string::npos) last = line;
   }
-  return last;
+  if (last.empty()) return fmt::format("it said nothing; see {}", log.string());
+  return fmt::format("it said: {}; see {}", last, log.string());
 }
 
 }  // namespace dtr::pipeline

@@ -55,7 +55,7 @@ std::vector<int> MissingParts(const Batch& batch, const BatchStage& stage);
 /// Words of the process that does it; `part` from 0. Of a stage in parts they end with --part K/N.
 std::vector<std::string> CommandOf(const Batch& batch, const BatchStage& stage, int part);
 
-/// What a process said last in its log; "" where it said nothing.
-std::string LastLine(const std::filesystem::path& log);
+/// What a process said last in its log, and where that is: "it said: [...]; see [log]".
+std::string LastWords(const std::filesystem::path& log);
 
 }  // namespace dtr::pipeline

@@ -49,10 +49,8 @@ void RunPartHere(const Batch& batch, const BatchStage& stage, int part, int thre
   options.should_stop = [&] { return progress.StopRequested(); };
   const ProcessResult result = RunProcess(words, options);
   if (result.Ok()) return;
-  failure.Set(
-      part,
-      fmt::format("{}: {}; it said: {}; see {}", NameOf(BuildPart{stage.name, {part, stage.parts}}),
-                  HowItEnded(result), LastLine(options.log_file), options.log_file.string()));
+  failure.Set(part, fmt::format("{}: {}; {}", NameOf(BuildPart{stage.name, {part, stage.parts}}),
+                                HowItEnded(result), LastWords(options.log_file)));
 }
 
 }  // namespace

@@ -1,0 +1,201 @@
+// Builds that several processes share: parts of stages by hand, and dtr batch on this machine.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <fstream>
+
+#include "dtr/base/durable.h"
+#include "tests/cli/run_dtr.h"
+#include "tests/cli/small_courtyard.h"
+#include "tests/support/test_data.h"
+
+namespace dtr::testing {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Photos with known cameras and no points: all stages but structure from motion's own mapping.
+class Batch : public ::testing::Test {
+ protected:
+  void SetUp() override { MakeSmallCourtyard(folder_ / "courtyard"); }
+
+  fs::path Set(const std::string& run) const {
+    fs::create_directories(folder_ / run);
+    return folder_ / run / "set.dtr";
+  }
+  std::vector<std::string> Words(const std::string& run,
+                                 const std::vector<std::string>& more = {}) const {
+    const fs::path courtyard = folder_ / "courtyard";
+    std::vector<std::string> words = {(courtyard / "images").string(),
+                                      "--poses",
+                                      (courtyard / "cameras.json").string(),
+                                      "--holdout",
+                                      "every:4",
+                                      "--neighbours",
+                                      "2",
+                                      "--round-neighbours",
+                                      "2",
+                                      "--iterations",
+                                      "1",
+                                      "--rounds",
+                                      "1",
+                                      "-o",
+                                      Set(run).string()};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+  Ran Stage(const std::string& run, const std::string& stage, const std::string& part = "",
+            const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> words = Words(run, more);
+    words.insert(words.begin(), "build");
+    words.insert(words.end(), {"--stage", stage});
+    if (!part.empty()) words.insert(words.end(), {"--part", part});
+    return Dtr(words);
+  }
+  Ran RunBatch(const std::string& run, const std::vector<std::string>& options,
+               const Interruption& interruption = {}) const {
+    std::vector<std::string> words = Words(run);
+    words.insert(words.begin(), "batch");
+    words.insert(words.end(), options.begin(), options.end());
+    return DtrByItself(words, interruption);
+  }
+  std::map<std::string, std::string> Undisturbed() const {
+    std::vector<std::string> words = Words("undisturbed");
+    words.insert(words.begin(), "build");
+    DtrOk(words);
+    return Contents(Set("undisturbed"));
+  }
+
+  const TemporaryFolder folder_;
+};
+
+TEST_F(Batch, ProcessesHereGiveTheBytesOfABuild) {
+  const Ran ran = RunBatch("batch", {"--local", "2", "--array-size", "3"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(DifferingFiles(Undisturbed(), Contents(Set("batch"))), ::testing::IsEmpty());
+  EXPECT_FALSE(fs::exists(Set("batch").string() + ".partial"));
+  const Ran status = DtrOk({"batch", "status", Set("batch").string(), "--json", "-"});
+  EXPECT_NE(status.out.find("\"finished\": true"), std::string::npos) << status.out;
+}
+
+TEST_F(Batch, AStoppedOneGoesOnWithWhatIsMissing) {
+  const fs::path parts = Set("batch").string() + ".partial/work/parts";
+  const auto done = [&](const char* name) {
+    return fs::exists(parts / (std::string(name) + ".done.json"));
+  };
+  const Ran stopped = RunBatch("batch", {"--local", "2", "--array-size", "3"},
+                               {SIGTERM, [&] { return done("undistortion_1_of_3"); }});
+  EXPECT_NE(stopped.code, 0);
+  const auto before = fs::last_write_time(parts / "matching_1_of_3.done.json");
+  const Ran status = DtrOk({"batch", "status", Set("batch").string(), "--json", "-"});
+  EXPECT_NE(status.out.find("\"finished\": false"), std::string::npos) << status.out;
+  const auto first_part = [&] { return fs::last_write_time(parts / "matching_1_of_3.done.json"); };
+  EXPECT_EQ(first_part(), before);
+  const Ran resumed = DtrByItself({"batch", "resume", Set("batch").string()});
+  ASSERT_EQ(resumed.code, 0) << resumed.err;
+  EXPECT_THAT(DifferingFiles(Undisturbed(), Contents(Set("batch"))), ::testing::IsEmpty());
+}
+
+TEST_F(Batch, AFailedPartIsNamedWithWhatItSaid) {
+  // Nothing is left of a photo when the first job has seen it.
+  ASSERT_EQ(Stage("batch", "capture").code, 0);
+  fs::remove_all(Set("batch").string() + ".partial/work/calibration/photos");
+  const Ran ran = RunBatch("batch", {"--local", "2", "--array-size", "2"});
+  // The first stage makes them again: a batch does not trust what it did not do.
+  EXPECT_EQ(ran.code, 0) << ran.err;
+
+  ASSERT_EQ(Stage("broken", "capture").code, 0);
+  const fs::path calibration = Set("broken").string() + ".partial/work/calibration";
+  fs::remove_all(calibration);
+  std::ofstream(calibration) << "no folder";
+  const Ran broken = RunBatch("broken", {"--local", "1", "--array-size", "2"});
+  ExpectRejected(broken, 1, "ended with code");
+}
+
+TEST_F(Batch, AStageWhoseInputsNobodyMadeNamesTheStageThatDoes) {
+  ExpectRejected(Stage("a", "features", "1/2"), 2, "run its stage `capture` first");
+  ASSERT_EQ(Stage("a", "capture").code, 0);
+  ExpectRejected(Stage("a", "matching", "1/2"), 1, "run the stage `pairs` first");
+  ExpectRejected(Stage("a", "undistortion", "1/2"), 1, "that the stage `calibration` freezes");
+  ASSERT_EQ(Stage("a", "calibration").code, 0);
+  ExpectRejected(Stage("a", "search", "1/2"), 1, "run all parts of the stage `undistortion` first");
+  ASSERT_EQ(Stage("a", "undistortion", "1/1").code, 0);
+  ExpectRejected(Stage("a", "search", "1/2"), 1, "run the stage `ranges` first");
+  ASSERT_EQ(Stage("a", "ranges").code, 0);
+  ASSERT_EQ(Stage("a", "search", "1/2").code, 0);
+  ExpectRejected(Stage("a", "pass-1", "1/2"), 1, "expected planes of the stage `search`");
+  ASSERT_EQ(Stage("a", "search", "2/2").code, 0);
+  ASSERT_EQ(Stage("a", "pass-1", "2/2").code, 0);
+  ExpectRejected(Stage("a", "maps", "1/2"), 1, "expected planes of the stage `pass-1`");
+}
+
+TEST_F(Batch, WhatIsNoPartOfThisBuildIsRejected) {
+  ExpectRejected(Stage("a", "capture", "1/2"), 2, "is for one process");
+  ExpectRejected(Stage("a", "capture", "3/2"), 2, "expected K/N with K from 1 to N");
+  ExpectRejected(Stage("a", "capture", "one"), 2, "expected K/N with K from 1 to N");
+  ExpectRejected(Stage("a", "pass-2"), 2, "expected one of capture");
+  ExpectRejected(Stage("a", "capture", "", {"--time-budget", "5"}), 2,
+                 "measures how much one machine does");
+  ExpectRejected(Stage("a", "capture", "", {"--force-stage", "depth"}), 2,
+                 "delete the partial set to begin again");
+  EXPECT_FALSE(fs::exists(Set("a").string() + ".partial"));
+  ASSERT_EQ(Stage("a", "capture").code, 0);
+  ExpectRejected(Stage("a", "features", "1/2", {"--iterations", "2"}), 2, "(options differ)");
+}
+
+TEST_F(Batch, TwoProcessesDoNotWorkOnOnePart) {
+  ASSERT_EQ(Stage("a", "capture").code, 0);
+  const fs::path work = Set("a").string() + ".partial/work";
+  fs::create_directories(work / "parts");
+  {
+    const auto lock = FileLock::Try(work / "parts/features_1_of_2.lock");
+    ASSERT_TRUE(lock);
+    ExpectRejected(Stage("a", "features", "1/2"), 2, "another process works on features, part 1");
+  }
+  {
+    // Who has a part keeps those away that need the set for themselves.
+    const auto lock = FileLock::Try(work / "lock", FileLock::Kind::kShared);
+    ASSERT_TRUE(lock);
+    EXPECT_EQ(Stage("a", "features", "2/2").code, 0);
+    ExpectRejected(Stage("a", "pairs"), 2, "another process is writing this set");
+  }
+  const auto alone = FileLock::Try(work / "lock");
+  ASSERT_TRUE(alone);
+  ExpectRejected(Stage("a", "features", "1/2"), 2,
+                 "another process is writing the whole of this set");
+}
+
+TEST_F(Batch, WordsThatCannotBeMeantAreRejectedBeforeAnyWork) {
+  ExpectRejected(RunBatch("a", {}), 2, "expected --slurm or --local N, found neither");
+  ExpectRejected(RunBatch("a", {"--local", "2", "--stage", "capture"}), 2,
+                 "runs all stages; leave out --stage and --part");
+  ExpectRejected(RunBatch("a", {"--local", "2", "--dynamic"}), 2, "time steps of a dynamic set");
+  ExpectRejected(RunBatch("a", {"--local", "2", "--no-such-option"}), 2, "`dtr build` of these");
+  ExpectRejected(Dtr({"batch", "status", Set("a").string()}), 1, "expected a batch of that set");
+  EXPECT_TRUE(fs::is_empty(folder_ / "a"));
+  {
+    const std::string path = getenv("PATH");
+    setenv("PATH", "", 1);
+    const Ran without = RunBatch("a", {"--slurm", "--dry-run"});
+    setenv("PATH", path.c_str(), 1);
+    ExpectRejected(without, 1, "expected Slurm's program on the PATH, found none");
+  }
+  const Ran dry = RunBatch("a", {"--local", "2", "--dry-run"});
+  EXPECT_EQ(dry.code, 0);
+  EXPECT_NE((dry.out + dry.err).find("matching: "), std::string::npos);
+  EXPECT_TRUE(fs::is_empty(folder_ / "a"));
+}
+
+TEST_F(Batch, AnotherBatchOfTheSameSetIsNotReplaced) {
+  ASSERT_EQ(RunBatch("a", {"--local", "2", "--array-size", "2"},
+                     {SIGTERM, [&] { return fs::exists(Set("a").string() + ".partial"); }})
+                    .code != 0,
+            true);
+  std::vector<std::string> other = Words("a", {"--max-size", "96"});
+  other.insert(other.begin(), "batch");
+  other.insert(other.end(), {"--local", "2"});
+  ExpectRejected(DtrByItself(other), 2, "expected a batch of the same words");
+}
+
+}  // namespace
+}  // namespace dtr::testing
