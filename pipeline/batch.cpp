@@ -44,6 +44,7 @@ Batch Planned(const BatchOptions& options) {
   batch.local = options.local;
   batch.threads = options.threads;
   batch.slurm = options.slurm;
+  batch.replaced = WhenWritten(batch.set);
   batch.memory_gb = options.build.depth.memory_gb.value_or(kDefaultMemoryGb);
   return batch;
 }
@@ -58,6 +59,7 @@ void KeepParts(const Batch& before, Batch& batch) {
   }
   batch.stages = before.stages;
   batch.jobs = before.jobs;
+  batch.replaced = before.replaced;
 }
 
 void RequireNoneUnderWay(const Batch& batch) {

@@ -78,6 +78,15 @@ TEST_F(Batch, ProcessesHereGiveTheBytesOfABuild) {
   EXPECT_NE(status.out.find("\"finished\": true"), std::string::npos) << status.out;
 }
 
+TEST_F(Batch, ForcedTheNewSetTakesThePlaceOfTheOld) {
+  DtrOk({"import", (folder_ / "courtyard").string(), "-o", Set("a").string()});
+  ExpectRejected(RunBatch("a", {"--local", "1", "--array-size", "2"}), 2,
+                 "choose another name or pass --force to replace it");
+  const Ran ran = RunBatch("a", {"--force", "--local", "2", "--array-size", "2"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(DifferingFiles(Undisturbed(), Contents(Set("a"))), ::testing::IsEmpty());
+}
+
 TEST_F(Batch, AStoppedOneGoesOnWithWhatIsMissing) {
   const fs::path parts = Set("batch").string() + ".partial/work/parts";
   const auto done = [&](const char* name) {

@@ -38,6 +38,7 @@ Json ToJson(const Batch& batch) {
           {"local", batch.local},
           {"threads", batch.threads},
           {"memory_gb", batch.memory_gb},
+          {"replaced", batch.replaced},
           {"slurm",
            {{"partition", slurm.partition},
             {"account", slurm.account},
@@ -63,6 +64,7 @@ Batch FromJson(const Json& json) {
   batch.local = json.at("local").get<int>();
   batch.threads = json.at("threads").get<int>();
   batch.memory_gb = json.at("memory_gb").get<double>();
+  batch.replaced = json.at("replaced").get<std::int64_t>();
   const Json& slurm = json.at("slurm");
   batch.slurm = {slurm.at("partition").get<std::string>(), slurm.at("account").get<std::string>(),
                  slurm.at("time").get<std::string>(), slurm.at("cpus_per_task").get<int>()};
@@ -109,9 +111,16 @@ Batch LoadBatch(const fs::path& set) {
   }
 }
 
+std::int64_t WhenWritten(const fs::path& set) {
+  std::error_code none;
+  const auto time = fs::last_write_time(set / "set.json", none);
+  return none ? 0 : static_cast<std::int64_t>(time.time_since_epoch().count());
+}
+
 std::vector<int> MissingParts(const Batch& batch, const BatchStage& stage) {
   if (stage.is_last) {
-    return fs::exists(batch.set / "set.json") ? std::vector<int>() : std::vector<int>{0};
+    const std::int64_t written = WhenWritten(batch.set);
+    return written != 0 && written != batch.replaced ? std::vector<int>() : std::vector<int>{0};
   }
   std::vector<int> missing;
   for (int part = 0; part < stage.parts; ++part) {

@@ -1,5 +1,6 @@
 // pipeline/detail/batch/batch_files.h -- SET.batch: what a batch consists of and what its jobs say.
 #pragma once
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -35,6 +36,9 @@ struct Batch {
   int threads = 0;
   SlurmOptions slurm;
   double memory_gb = 0;  ///< of a process
+  /// When the set was written that `force` replaces, in ticks of the file system's clock; 0: there
+  /// was none. Another one is this batch's.
+  std::int64_t replaced = 0;
   std::vector<BatchJobs> jobs;
 };
 
@@ -48,6 +52,9 @@ void WriteBatch(const Batch& batch);
 /// Throws Error where there is none or it is damaged.
 Batch LoadBatch(const std::filesystem::path& set);
 bool HasBatch(const std::filesystem::path& set);
+
+/// When the set was written; 0 where there is none.
+std::int64_t WhenWritten(const std::filesystem::path& set);
 
 /// The parts of a stage that are not done, from 0.
 std::vector<int> MissingParts(const Batch& batch, const BatchStage& stage);
