@@ -79,7 +79,7 @@ TEST_F(Batch, ProcessesHereGiveTheBytesOfABuild) {
 }
 
 TEST_F(Batch, ForcedTheNewSetTakesThePlaceOfTheOld) {
-  DtrOk({"import", (folder_ / "courtyard").string(), "-o", Set("a").string()});
+  ImportSmallCourtyard(folder_ / "courtyard", Set("a"));
   ExpectRejected(RunBatch("a", {"--local", "1", "--array-size", "2"}), 2,
                  "choose another name or pass --force to replace it");
   const Ran ran = RunBatch("a", {"--force", "--local", "2", "--array-size", "2"});
