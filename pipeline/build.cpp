@@ -128,7 +128,7 @@ capture::Capture FramesOf(const BuildOptions& options, const std::filesystem::pa
   if (!std::filesystem::exists(kept / capture::kCaptureFile)) {
     if (is_shared) {
       throw Error(kept.string() +
-                  ": expected the frames that the stage `capture` chooses, found none; run that "
+                  ": expected the frames that the stage capture chooses, found none; run that "
                   "stage first");
     }
     capture::VideoOptions video = options.video;
@@ -275,7 +275,7 @@ void RequireImages(std::vector<View>& views, const io::SetWriter& writer) {
     if (view.image_file || writer.RestoreView(view)) continue;
     throw Error(view.name +
                 ": expected its undistorted image, found none; run all parts of the stage "
-                "`undistortion` first");
+                "undistortion first");
   }
 }
 

@@ -95,8 +95,8 @@ void RequirePass(const Collection& c, std::span<const int> views, const PlaneMap
         std::find_if(around.begin(), around.end(), [&](int v) { return !store.Has(pass, v); });
     if (missing == around.end()) continue;
     const std::string stage = pass == 0 ? "search" : "pass-" + std::to_string(pass);
-    throw Error("depth: expected planes of the stage `" + stage +
-                "` of every view, found none of "
+    throw Error("depth: expected planes of the stage " + stage +
+                " of every view, found none of "
                 "view " +
                 std::to_string(*missing) + "; run all parts of that stage first");
   }

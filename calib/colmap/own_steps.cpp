@@ -200,7 +200,7 @@ void OwnFeatures(Workspace& workspace, const fs::path& database,
     throw PartDone();
   }
   if (part && part->stage != SfmStage::kPairs) {
-    throw Error("features: expected those of all photos, found none; run the stage `pairs` first");
+    throw Error("features: expected those of all photos, found none; run the stage pairs first");
   }
   const FeatureParts parts(workspace, database);
   AddInBatches(workspace, database, images, KeptOrNew(workspace, database, groups), plan,

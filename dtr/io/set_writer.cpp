@@ -235,7 +235,7 @@ void SetWriter::State::OpenPartial(const std::string& fingerprint) {
 void SetWriter::State::JoinPartial(const std::string& fingerprint) {
   if (!fs::exists(partial / kFingerprint)) {
     throw UsageError(partial.string() +
-                     ": expected a build to join, found none; run its stage `capture` first");
+                     ": expected a build to join, found none; run its stage capture first");
   }
   lock = FileLock::Try(partial / kLock, FileLock::Kind::kShared);
   if (!lock) {

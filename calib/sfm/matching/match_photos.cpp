@@ -130,7 +130,7 @@ std::vector<CoarsePair> AllOf(std::vector<std::optional<CoarsePair>>&& coarse) {
   if (!missing.empty()) {
     throw Error(
         fmt::format("matches: expected {} pairs that were compared, found {}; run all "
-                    "parts of the stage `matching` first",
+                    "parts of the stage matching first",
                     coarse.size(), coarse.size() - missing.size()));
   }
   std::vector<CoarsePair> all;
@@ -154,7 +154,7 @@ std::vector<std::pair<int, int>> PairsOf(PairJournal::Content& kept,
   if (!kept.pairs) {
     if (options.part && options.part->stage != MatchPart::Stage::kPairs) {
       throw Error(
-          "matches: expected pairs of photos that were chosen, found none; run the stage `pairs` "
+          "matches: expected pairs of photos that were chosen, found none; run the stage pairs "
           "first");
     }
     kept.pairs = ChoosePairs(photos, options, progress);

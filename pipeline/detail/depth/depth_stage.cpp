@@ -182,7 +182,7 @@ void KeepRanges(const RangeInputs& in, const std::function<bool(int)>& is_done, 
   const bool ranges_alone = in.options.part && in.options.part->ranges_alone;
   if (!ranges && in.options.part && !ranges_alone) {
     throw Error(
-        "depth: expected depth ranges that were found, found none; run the stage `ranges` "
+        "depth: expected depth ranges that were found, found none; run the stage ranges "
         "first");
   }
   if (!ranges) {

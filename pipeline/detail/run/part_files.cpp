@@ -61,9 +61,8 @@ void RequirePart(const BuildPart& part, const std::vector<BuildStage>& stages) {
         fmt::format("`part` {}/{}: expected K/N with K from 1 to N", index + 1, count));
   }
   if (!stage->has_parts && count > 1) {
-    throw UsageError(
-        fmt::format("`part` {}/{}: the stage `{}` is for one process; leave out `part`", index + 1,
-                    count, part.stage));
+    throw UsageError(fmt::format("`part` {}/{}: the stage {} is for one process; leave out `part`",
+                                 index + 1, count, part.stage));
   }
 }
 
@@ -151,7 +150,7 @@ CalibratedPhotos FrozenCalibration(const fs::path& work) {
   const fs::path folder = work / kFrozen;
   const auto reject = [&](const char* found) {
     throw Error(
-        fmt::format("{}: expected the cameras that the stage `calibration` freezes, found "
+        fmt::format("{}: expected the cameras that the stage calibration freezes, found "
                     "{}; run that stage first",
                     folder.string(), found));
   };

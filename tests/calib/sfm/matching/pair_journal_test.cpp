@@ -237,12 +237,12 @@ TEST(MatchInParts, WhatAPartNeedsAndNobodyDidIsNamed) {
     }
     return std::string();
   };
-  EXPECT_NE(message(Stage::kMatching).find("run the stage `pairs` first"), std::string::npos);
+  EXPECT_NE(message(Stage::kMatching).find("run the stage pairs first"), std::string::npos);
   RunPart(files, options, Stage::kPairs, 0, 1);
   RunPart(files, options, Stage::kMatching, 0, 2);
   EXPECT_EQ(message(Stage::kVerification),
             "matches: expected 10 pairs that were compared, found 5; run all parts of the stage "
-            "`matching` first");
+            "matching first");
 }
 
 }  // namespace
