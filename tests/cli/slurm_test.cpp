@@ -115,8 +115,10 @@ TEST(Slurm, JobsOfWhichOneIsKilledGiveTheBytesOfABuildInTheEnd) {
   const TemporaryFolder folder;
   const Cluster cluster(folder / "slurm");
   ASSERT_TRUE(Within(seconds(60), [] { return Cluster::IsIdle(); })) << "the node never got ready";
-  DtrOk({"dataset", "make", "courtyard", "-o", (folder / "courtyard").string(), "--views", "24",
-         "--size", "192x128"});
+  const Ran made =
+      Dtr({"dataset", "make", "courtyard", "-o", (folder / "courtyard").string(), "--layout", "arc",
+           "--views", "24", "--width", "192", "--height", "128", "--supersampling", "1"});
+  ASSERT_EQ(made.code, 0) << made.err;
   const auto words = [&](const char* command, const fs::path& set) {
     return std::vector<std::string>{command,    (folder / "courtyard/images").string(),
                                     "--poses",  (folder / "courtyard/cameras.json").string(),
@@ -135,7 +137,9 @@ TEST(Slurm, JobsOfWhichOneIsKilledGiveTheBytesOfABuildInTheEnd) {
   const Ran submitted = DtrByItself(batch);
   ASSERT_EQ(submitted.code, 0) << submitted.err;
   pid_t victim = 0;
-  ASSERT_TRUE(Within(seconds(300), [&] { return (victim = ProcessOf("search")) > 0; }));
+  ASSERT_TRUE(Within(seconds(300),
+                     [&] { return (victim = ProcessOf("search")) > 0 || Cluster::IsEmpty(); }));
+  ASSERT_GT(victim, 0) << DtrByItself({"batch", "status", set.string()}).out;
   kill(victim, SIGKILL);
   ASSERT_TRUE(Within(seconds(300), [] { return Cluster::IsEmpty(); }));
   const Ran status = DtrByItself({"batch", "status", set.string()});
