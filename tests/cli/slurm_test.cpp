@@ -96,14 +96,15 @@ class Cluster {
   std::vector<pid_t> daemons_;
 };
 
-// The process of a part, as a node would have it; 0 where there is none.
-pid_t ProcessOf(const std::string& stage) {
+// A process that does a part for this set; 0 where there is none.
+pid_t ProcessOf(const std::string& stage, const fs::path& set) {
   for (const auto& entry : fs::directory_iterator("/proc")) {
     const std::string name = entry.path().filename();
     if (name.find_first_not_of("0123456789") != std::string::npos) continue;
     std::ifstream file(entry.path() / "cmdline", std::ios::binary);
     const std::string words((std::istreambuf_iterator<char>(file)), {});
-    if (words.find(std::string("--stage") + '\0' + stage + '\0') != std::string::npos) {
+    if (words.find(set.string()) != std::string::npos &&
+        words.find(std::string("--stage") + '\0' + stage + '\0') != std::string::npos) {
       return std::stoi(name);
     }
   }
@@ -137,8 +138,8 @@ TEST(Slurm, JobsOfWhichOneIsKilledGiveTheBytesOfABuildInTheEnd) {
   const Ran submitted = DtrByItself(batch);
   ASSERT_EQ(submitted.code, 0) << submitted.err;
   pid_t victim = 0;
-  ASSERT_TRUE(Within(seconds(300),
-                     [&] { return (victim = ProcessOf("search")) > 0 || Cluster::IsEmpty(); }));
+  ASSERT_TRUE(Within(
+      seconds(300), [&] { return (victim = ProcessOf("search", set)) > 0 || Cluster::IsEmpty(); }));
   ASSERT_GT(victim, 0) << DtrByItself({"batch", "status", set.string()}).out;
   kill(victim, SIGKILL);
   ASSERT_TRUE(Within(seconds(300), [] { return Cluster::IsEmpty(); }));
