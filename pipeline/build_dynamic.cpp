@@ -15,6 +15,7 @@
 #include "dtr/eval/json.h"
 #include "dtr/io/run_record_json.h"
 #include "dtr/io/set_io.h"
+#include "dtr/io/still_once.h"
 #include "dtr/io/validation_result.h"
 #include "dtr/render/time_steps.h"
 #include "pipeline/detail/depth/depth_engine.h"
@@ -148,11 +149,11 @@ void FinishViews(const SparseScene& points, const BuildOptions& options, double 
     if (options.depth.completion) {
       CompleteDepth(still, points, writer, options.threads, memory_gb, quiet);
     }
-    WriteMeshes(still, writer, options.threads, quiet);
     PutBack(std::move(still), step, set);
     progress.Update(static_cast<int>(step) + 1);
     progress.ThrowIfInterrupted();
   }
+  io::StoreStillOnce(writer.folder(), set, options.threads, memory_gb, progress);
 }
 
 }  // namespace

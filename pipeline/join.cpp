@@ -76,7 +76,8 @@ void WriteViews(const fs::path& folder, size_t index, Frame& frame, LengthUnit u
     View joined = view;
     joined.id = fmt::format("t{:04}_{}", index, view.id);
     for (auto* file : {&joined.image_file, &joined.mask_file, &joined.depth_file,
-                       &joined.completed_file, &joined.sigma_file, &joined.mesh_file}) {
+                       &joined.completed_file, &joined.sigma_file, &joined.mesh_file,
+                       &joined.depth_base, &joined.completed_base, &joined.sigma_base}) {
       file->reset();
     }
     const bool written = writer.RestoreView(joined);  // by a run that was interrupted

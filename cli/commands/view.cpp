@@ -215,8 +215,8 @@ std::string FileStamp(const fs::path& file) {
 /// Of the files that images are made of; empty while one is missing.
 std::string ViewStampOf(const fs::path& set, const View& view) {
   std::string stamp;
-  for (const auto* file :
-       {&view.image_file, &view.mask_file, &view.depth_file, &view.completed_file}) {
+  for (const auto* file : {&view.image_file, &view.mask_file, &view.depth_file, &view.depth_base,
+                           &view.completed_file, &view.completed_base}) {
     if (!file->has_value()) continue;
     const std::string one = FileStamp(set / (*file)->path);
     if (one.empty()) return "";

@@ -1,5 +1,9 @@
 #include "dtr/io/code_residuals.h"
 
+#include <bit>
+
+#include "dtr/io/zstd_parts.h"
+
 namespace dtr::io {
 namespace {
 
@@ -10,6 +14,43 @@ std::uint16_t Folded(int difference) {
 }
 
 }  // namespace
+
+void XorRows(std::vector<std::uint8_t>& bits, int width_px) {
+  const size_t row_bytes = ValidityRowBytes(width_px);
+  for (size_t i = bits.size(); i-- > row_bytes;) {
+    bits[i] = static_cast<std::uint8_t>(bits[i] ^ bits[i - row_bytes]);
+  }
+}
+
+void XorRowsBack(std::vector<std::uint8_t>& bits, int width_px) {
+  const size_t row_bytes = ValidityRowBytes(width_px);
+  for (size_t i = row_bytes; i < bits.size(); ++i) {
+    bits[i] = static_cast<std::uint8_t>(bits[i] ^ bits[i - row_bytes]);
+  }
+  const int used_bits = (width_px - 1) % 8 + 1;
+  const int padding = 255 & ~((1 << used_bits) - 1);
+  for (size_t i = row_bytes; i <= bits.size(); i += row_bytes) {
+    if ((bits[i - 1] & padding) != 0) FailCoded("0 beyond a row", "1");
+  }
+}
+
+size_t CountBits(const std::vector<std::uint8_t>& bits) {
+  size_t count = 0;
+  for (const std::uint8_t byte : bits) count += static_cast<size_t>(std::popcount(byte));
+  return count;
+}
+
+void AddResidual(std::uint16_t code, int predicted, CodeParts& parts) {
+  const std::uint16_t folded = Folded(code - predicted);
+  parts.residuals.push_back(static_cast<std::uint8_t>(std::min<int>(folded, kWide)));
+  if (folded < kWide) return;
+  parts.wide.push_back(static_cast<std::uint8_t>(folded & 255));
+  parts.wide.push_back(static_cast<std::uint8_t>(folded >> 8));
+}
+
+void ResidualReader::ExpectNoHole() const {
+  if (hole_) FailCoded("codes of at least 1 where there is depth", "0");
+}
 
 CodeParts SplitCodes(const Grid<std::uint16_t>& codes, int first_row, int rows) {
   const int width = codes.width();
@@ -28,18 +69,11 @@ CodeParts SplitCodes(const Grid<std::uint16_t>& codes, int first_row, int rows) 
         continue;
       }
       surface.Put(x, row[x]);
-      bits[x / 8] = static_cast<std::uint8_t>(bits[x / 8] | 1 << (x % 8));
-      const std::uint16_t folded = Folded(row[x] - predicted);
-      parts.residuals.push_back(static_cast<std::uint8_t>(std::min<int>(folded, kWide)));
-      if (folded < kWide) continue;
-      parts.wide.push_back(static_cast<std::uint8_t>(folded & 255));
-      parts.wide.push_back(static_cast<std::uint8_t>(folded >> 8));
+      SetBit(bits, x);
+      AddResidual(row[x], predicted, parts);
     }
   }
-  for (size_t i = parts.validity.size(); i-- > row_bytes;) {
-    parts.validity[i] =
-        static_cast<std::uint8_t>(parts.validity[i] ^ parts.validity[i - row_bytes]);
-  }
+  XorRows(parts.validity, width);
   return parts;
 }
 

@@ -1,5 +1,5 @@
 // dtr/io/code_residuals.h -- 16-bit codes with holes as small numbers, for any compressor
-// (docs/FORMAT.md, section 4.1).
+// (docs/FORMAT.md, sections 4.1 and 4.3).
 #pragma once
 #include <algorithm>
 #include <cstdint>
@@ -21,6 +21,15 @@ struct CodeParts {
 
 /// Bytes of a row of validity bits.
 inline size_t ValidityRowBytes(int width_px) { return (static_cast<size_t>(width_px) + 7) / 8; }
+inline bool BitAt(const std::uint8_t* bits, int x) { return (bits[x / 8] >> (x % 8) & 1) != 0; }
+inline void SetBit(std::uint8_t* bits, int x) {
+  bits[x / 8] = static_cast<std::uint8_t>(bits[x / 8] | 1 << (x % 8));
+}
+/// Each row of bits XOR the one above it, and back. Going back throws Error where bits are set
+/// beyond the end of a row.
+void XorRows(std::vector<std::uint8_t>& bits, int width_px);
+void XorRowsBack(std::vector<std::uint8_t>& bits, int width_px);
+size_t CountBits(const std::vector<std::uint8_t>& bits);
 
 /// MED of JPEG-LS (Weinberger, Seroussi, Sapiro, IEEE TIP 2000, eq. 1), as the median of three.
 inline int PredictedCode(int left, int above, int above_left) {
@@ -52,6 +61,33 @@ class PredictedSurface {
   std::vector<int> row_;  ///< of the row above from x on, of this one before; [0] is not used
   int left_ = 0, above_left_ = 0;
   bool first_ = true;
+};
+
+/// Adds the residual of a code that is no hole.
+void AddResidual(std::uint16_t code, int predicted, CodeParts& parts);
+
+/// Takes codes back from residuals, of which `parts` has as many as are asked for.
+class ResidualReader {
+ public:
+  explicit ResidualReader(const CodeParts& parts)
+      : next_(parts.residuals.data()), wide_(parts.wide.data()) {}
+  std::uint16_t Next(int predicted) {
+    unsigned folded = *next_++;
+    if (folded == kWide) {
+      folded = wide_[0] | static_cast<unsigned>(wide_[1]) << 8;
+      wide_ += 2;
+    }
+    const int difference = static_cast<int>(folded >> 1) ^ -static_cast<int>(folded & 1);
+    const auto code = static_cast<std::uint16_t>(predicted + difference);
+    hole_ |= code == 0;
+    return code;
+  }
+  /// Throws Error where a code was 0, which no residual stands for.
+  void ExpectNoHole() const;
+
+ private:
+  const std::uint8_t *next_, *wide_;
+  bool hole_ = false;
 };
 
 /// Rows [first_row, first_row + rows) of the codes; code 0 is a hole.

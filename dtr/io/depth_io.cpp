@@ -1,14 +1,19 @@
 #include "dtr/io/depth_io.h"
 
+#include <algorithm>
 #include <bit>
 #include <cctype>
 #include <cmath>
+#include <span>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/base/hash.h"
 #include "dtr/io/code_bands.h"
+#include "dtr/io/code_differences.h"
 #include "dtr/io/oiio_files.h"
 
 namespace dtr::io {
@@ -169,14 +174,33 @@ void ExpectSigma(const fs::path& file, const Grid<float>& sigma) {
   }
 }
 
-// Codes say by themselves that they lie in the range.
-DepthImage ReadBands(const fs::path& file, const DepthFormat& format, int width_px, int height_px) {
-  const std::string bytes = ReadFile(file, MostBandBytes(width_px, height_px));
-  return Naming(file, [&] {
-    return DecodeInverseDepth(DecodeBands(bytes, width_px, height_px), format.near_z, format.far_z,
-                              format.steps);
-  });
+// Codes of a file of differences to a base, once that is the one they were written against.
+Grid<std::uint16_t> ReadDifferences(const fs::path& file, const BaseFile& base, int width_px,
+                                    int height_px) {
+  const std::string bytes = ReadFile(file, MostDifferenceBytes(width_px, height_px));
+  if (Naming(file, [&] { return BaseOfDifferences(bytes); }) != base.sha256) {
+    throw Error(file.string() + ": expected differences to " + base.file.string() +
+                ", as set.json says, found differences to another base");
+  }
+  const std::string of_base = ReadFile(base.file, MostBandBytes(width_px, height_px));
+  if (Sha256(std::as_bytes(std::span(of_base))) != base.sha256) {
+    throw Error(base.file.string() +
+                ": expected the content that the set records, found another; dtr info with "
+                "`verify` names every such file");
+  }
+  const auto codes = Naming(base.file, [&] { return DecodeBands(of_base, width_px, height_px); });
+  return Naming(file, [&] { return DecodeDifferences(bytes, codes); });
 }
+
+// Codes of a file of our own coding.
+Grid<std::uint16_t> ReadCodes(const fs::path& file, int width_px, int height_px,
+                              const std::optional<BaseFile>& base) {
+  if (base) return ReadDifferences(file, *base, width_px, height_px);
+  const std::string bytes = ReadFile(file, MostBandBytes(width_px, height_px));
+  return Naming(file, [&] { return DecodeBands(bytes, width_px, height_px); });
+}
+
+constexpr int kSigmaBits = 16;  // the upper ones of float32 hold eight significant bits
 
 void WriteFloats(const fs::path& file, const Grid<float>& grid,
                  const std::vector<std::string>& channels, TypeDesc type) {
@@ -249,9 +273,13 @@ void WriteDepth(const fs::path& file, const DepthImage& depth, const DepthFormat
   WriteFileAtomically(file, EncodeBands(codes));
 }
 
-DepthImage ReadDepth(const fs::path& file, const DepthFormat& format, int width_px, int height_px) {
+DepthImage ReadDepth(const fs::path& file, const DepthFormat& format, int width_px, int height_px,
+                     const std::optional<BaseFile>& base) {
   if (format.coding == DepthCoding::kZstdInverseDepth) {
-    return ReadBands(file, format, width_px, height_px);
+    // Codes say by themselves that they lie in the range.
+    const auto codes = ReadCodes(file, width_px, height_px, base);
+    return Naming(
+        file, [&] { return DecodeInverseDepth(codes, format.near_z, format.far_z, format.steps); });
   }
   const auto in = OpenImage(file, kImageLimitPx);
   ExpectSize(*in, file, width_px, height_px);
@@ -283,12 +311,45 @@ void WriteSigma(const fs::path& file, const Grid<float>& inverse_depth_sigma) {
   WriteExr(file, rounded, false);
 }
 
-Grid<float> ReadSigma(const fs::path& file, int width_px, int height_px) {
-  const auto in = OpenImage(file, kImageLimitPx);
-  ExpectSize(*in, file, width_px, height_px);
-  Grid<float> sigma = ReadFloatsOf(*in, file);
+Grid<float> ReadSigma(const fs::path& file, int width_px, int height_px,
+                      const std::optional<BaseFile>& base) {
+  Grid<float> sigma(width_px, height_px);
+  if (base) {
+    const auto codes = ReadCodes(file, width_px, height_px, base);
+    std::transform(codes.data().begin(), codes.data().end(), sigma.data().begin(),
+                   [](std::uint16_t code) {
+                     return std::bit_cast<float>(static_cast<std::uint32_t>(code) << kSigmaBits);
+                   });
+  } else {
+    const auto in = OpenImage(file, kImageLimitPx);
+    ExpectSize(*in, file, width_px, height_px);
+    sigma = ReadFloatsOf(*in, file);
+  }
   ExpectSigma(file, sigma);
   return sigma;
+}
+
+Grid<std::uint16_t> ReadDepthCodes(const fs::path& file, const DepthFormat& format, int width_px,
+                                   int height_px) {
+  if (format.coding == DepthCoding::kZstdInverseDepth) {
+    return ReadCodes(file, width_px, height_px, {});
+  }
+  if (format.coding != DepthCoding::kPng16InverseDepth) {
+    throw std::invalid_argument("ReadDepthCodes: expected a coding of inverse depth in steps");
+  }
+  const auto in = OpenImage(file, kImageLimitPx);
+  ExpectSize(*in, file, width_px, height_px);
+  return ReadCodesOf(*in, file);
+}
+
+std::optional<Grid<std::uint16_t>> SigmaCodes(const Grid<float>& inverse_depth_sigma) {
+  Grid<std::uint16_t> codes(inverse_depth_sigma.width(), inverse_depth_sigma.height());
+  for (size_t i = 0; i < codes.data().size(); ++i) {
+    const auto bits = std::bit_cast<std::uint32_t>(inverse_depth_sigma.data()[i]);
+    if ((bits & ((1u << kSigmaBits) - 1u)) != 0) return {};
+    codes.data()[i] = static_cast<std::uint16_t>(bits >> kSigmaBits);
+  }
+  return codes;
 }
 
 }  // namespace dtr::io

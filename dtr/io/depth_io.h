@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "dtr/io/image_io.h"
@@ -27,6 +28,12 @@ void WriteExrOfVectors(const std::filesystem::path& file, const Grid<float>& gri
 Grid<std::uint16_t> ReadPng16(const std::filesystem::path& file,
                               std::uint64_t limit_px = kImageLimitPx);
 void WritePng16(const std::filesystem::path& file, const Grid<std::uint16_t>& grid);
+
+/// The file that another one is differences to (docs/FORMAT.md, section 4.3), and its content.
+struct BaseFile {
+  std::filesystem::path file;
+  std::string sha256;
+};
 
 /// What the numbers in a depth file mean.
 struct DepthFormat {
@@ -97,15 +104,26 @@ DepthRangeOfMap RangeOf(const DepthImage& depth);
 void WriteDepth(const std::filesystem::path& file, const DepthImage& depth,
                 const DepthFormat& format);
 /// Reads it back as plane z. `width_px`, `height_px`: the size it must have, checked before any
-/// pixel is read. Throws Error for another size, a damaged file or depths outside the range.
+/// pixel is read. With a base (zstd-inverse only) the file is differences to it. Throws Error for
+/// another size, a damaged file, another base or depths outside the range.
 DepthImage ReadDepth(const std::filesystem::path& file, const DepthFormat& format, int width_px,
-                     int height_px);
+                     int height_px, const std::optional<BaseFile>& base = {});
 
 /// Standard deviation of inverse depth, 1/scene unit, one number per depth pixel, 0 where depth is
 /// a hole: float32 EXR whose numbers keep 8 significant bits (relative error at most 2^-8; a
 /// standard deviation is never known better), which halves the file. Throws Error for negative or
 /// not finite values.
 void WriteSigma(const std::filesystem::path& file, const Grid<float>& inverse_depth_sigma);
-Grid<float> ReadSigma(const std::filesystem::path& file, int width_px, int height_px);
+/// With a base the file is differences of SigmaCodes to it.
+Grid<float> ReadSigma(const std::filesystem::path& file, int width_px, int height_px,
+                      const std::optional<BaseFile>& base = {});
+
+/// The codes of a depth file, as EncodeInverseDepth gives them: png16-inverse or zstd-inverse,
+/// whole by itself. Throws as ReadDepth.
+Grid<std::uint16_t> ReadDepthCodes(const std::filesystem::path& file, const DepthFormat& format,
+                                   int width_px, int height_px);
+/// Sigmas as WriteSigma rounds them in 16 bits: the upper half of a float32 (bfloat16). Empty where
+/// one has more bits than that.
+std::optional<Grid<std::uint16_t>> SigmaCodes(const Grid<float>& inverse_depth_sigma);
 
 }  // namespace dtr::io

@@ -11,6 +11,7 @@ namespace dtr::io {
 namespace {
 
 constexpr char kHeldOutFormat[] = "dtr-held-out";
+constexpr int kListVersion = 1;
 
 template <typename Set>
 auto HeldOutFilesOf(Set& set) {
@@ -39,7 +40,7 @@ std::string HeldOutFilesJson(const DtrSet& set, const std::string& file) {
   const std::vector<const StoredFile*> stored = HeldOutFilesOf(set);
   if (stored.empty()) return "";
   Json root = {
-      {"format", kHeldOutFormat}, {"format_version", kFormatVersion}, {"files", Json::array()}};
+      {"format", kHeldOutFormat}, {"format_version", kListVersion}, {"files", Json::array()}};
   for (const StoredFile* entry : stored) root["files"].push_back(JsonFromStoredFile(*entry));
   return PrettyJson(root, file);
 }
@@ -48,8 +49,8 @@ void MergeHeldOutFiles(const std::string& text, const std::string& file, DtrSet&
   const Json parsed = ParseJson(text, file);
   const JsonObject root(parsed, file, "");
   if (root.String("format") != kHeldOutFormat) root.Fail("format", "\"dtr-held-out\"");
-  if (root.PositiveInt("format_version") != kFormatVersion) {
-    root.Fail("format_version", std::to_string(kFormatVersion));
+  if (root.PositiveInt("format_version") != kListVersion) {
+    root.Fail("format_version", std::to_string(kListVersion));
   }
   std::map<std::string, std::vector<StoredFile*>> wanted;
   for (StoredFile* stored : HeldOutFilesOf(set)) {

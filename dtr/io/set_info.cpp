@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <chrono>
 #include <ctime>
+#include <set>
 #include <sstream>
+#include <string_view>
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -25,12 +27,55 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Of the files of a view, those that it has with other time steps left out.
 std::uint64_t BytesOf(const View& view) {
   std::uint64_t bytes = 0;
   for (const auto* file : {&view.image_file, &view.mask_file, &view.depth_file,
                            &view.completed_file, &view.sigma_file, &view.mesh_file}) {
     if (*file) bytes += (*file)->bytes;
   }
+  return bytes;
+}
+
+// What a set consists of, each file counted once, however many views name it.
+struct SetPart {
+  const char* name;
+  std::uint64_t bytes = 0;
+};
+
+std::vector<SetPart> PartsOf(const DtrSet& set) {
+  std::vector<SetPart> parts{{"images"},          {"masks"},    {"depth"},
+                             {"completed_depth"}, {"sigma"},    {"meshes"},
+                             {"still_parts"},     {"held_out"}, {"points"}};
+  std::set<std::string> counted;
+  const auto add = [&](const char* name, const std::optional<StoredFile>& file) {
+    if (!file || !counted.insert(file->path).second) return;
+    for (SetPart& part : parts) {
+      if (std::string_view(part.name) == name) part.bytes += file->bytes;
+    }
+  };
+  for (const Frame& frame : set.frames) {
+    for (const View& view : frame.views) {
+      const bool source = view.role == ViewRole::kSource;
+      add(source ? "images" : "held_out", view.image_file);
+      add(source ? "masks" : "held_out", view.mask_file);
+      add("depth", view.depth_file);
+      add("completed_depth", view.completed_file);
+      add("sigma", view.sigma_file);
+      add("meshes", view.mesh_file);
+      for (const auto* base : {&view.depth_base, &view.completed_base, &view.sigma_base}) {
+        add("still_parts", *base);
+      }
+    }
+  }
+  add("points", set.sparse_file);
+  std::erase_if(parts, [](const SetPart& part) { return part.bytes == 0; });
+  return parts;
+}
+
+std::uint64_t TotalOf(const std::vector<SetPart>& parts) {
+  std::uint64_t bytes = 0;
+  for (const SetPart& part : parts) bytes += part.bytes;
   return bytes;
 }
 
@@ -143,13 +188,26 @@ Json HostInfo() {
 
 }  // namespace
 
+namespace {
+
+std::string PartsLine(const std::vector<SetPart>& parts) {
+  std::string line;
+  for (const SetPart& part : parts) {
+    std::string name = part.name;
+    std::replace(name.begin(), name.end(), '_', ' ');
+    line += (line.empty() ? "" : ", ") + name + " " + Megabytes(part.bytes);
+  }
+  return line;
+}
+
+}  // namespace
+
 std::string DescribeSet(const DtrSet& set) {
-  std::uint64_t bytes = set.sparse_file ? set.sparse_file->bytes : 0;
+  const std::vector<SetPart> parts = PartsOf(set);
   size_t sources = 0, held_out = 0;
   std::ostringstream lines;
   for (const Frame& frame : set.frames) {
     for (const View& view : frame.views) {
-      bytes += BytesOf(view);
       ++(view.role == ViewRole::kSource ? sources : held_out);
       lines << "  " << view.name << ": " << NameOf(view.role) << ", " << view.camera.width_px()
             << "x" << view.camera.height_px() << ", f " << view.camera.fx_px() << " px";
@@ -165,20 +223,22 @@ std::string DescribeSet(const DtrSet& set) {
   std::ostringstream out;
   out << "D+TR set: " << sources << " source views, " << held_out << " held out, "
       << set.frames.size() << (set.frames.size() == 1 ? " frame, " : " frames, ")
-      << Megabytes(bytes) << "\nunit: " << NameOf(set.unit) << "\n"
+      << Megabytes(TotalOf(parts)) << "\nparts: " << PartsLine(parts)
+      << "\nunit: " << NameOf(set.unit) << "\n"
       << RigLine(set) << "scene centre: (" << set.scene_center.transpose()
       << ")\nvalidation: " << ValidationLine(set) << "\nviews:\n";
   return out.str() + lines.str() + DescribePruned(set);
 }
 
 std::string InfoJson(const DtrSet& set) {
-  Json info = {{"format_version", kFormatVersion},
+  Json info = {{"format_version", FormatVersionOf(set)},
                {"unit", NameOf(set.unit)},
                {"world_origin", Numbers(set.world_origin)},
                {"scene_center", Numbers(set.scene_center)},
                {"bounds", nullptr},
                {"frames", set.frames.size()},
                {"bytes", 0},
+               {"parts", Json::object()},
                {"has_sparse", set.sparse_file.has_value()},
                {"verdict", ParseJson(set.validation_json, "verdict")},
                {"provenance", ParseJson(set.provenance_json, "provenance")},
@@ -187,14 +247,12 @@ std::string InfoJson(const DtrSet& set) {
     info["bounds"] = {{"min", Numbers(set.bounds.min)}, {"max", Numbers(set.bounds.max)}};
   }
   if (Json pruned = PrunedOf(set); !pruned.is_null()) info["pruned"] = std::move(pruned);
-  std::uint64_t bytes = set.sparse_file ? set.sparse_file->bytes : 0;
   for (size_t f = 0; f < set.frames.size(); ++f) {
-    for (const View& view : set.frames[f].views) {
-      bytes += BytesOf(view);
-      info["views"].push_back(ViewInfo(view, f));
-    }
+    for (const View& view : set.frames[f].views) info["views"].push_back(ViewInfo(view, f));
   }
-  info["bytes"] = bytes;
+  const std::vector<SetPart> parts = PartsOf(set);
+  for (const SetPart& part : parts) info["parts"][part.name] = part.bytes;
+  info["bytes"] = TotalOf(parts);
   return PrettyJson(info, "info");
 }
 

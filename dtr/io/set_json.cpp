@@ -121,6 +121,19 @@ Json ToJson(const Pose& pose) {
           {"translation", NumbersToJson(pose.translation)}};
 }
 
+// The file that another one is differences to, if it is.
+std::optional<StoredFile> BaseFrom(const JsonObject& object) {
+  if (!object.Has("base")) return {};
+  const JsonObject base = object.Object("base");
+  const StoredFile file = StoredFileFromJson(base);
+  if (!base.Unknown().empty()) object.Fail("base", "path, sha256 and bytes alone");
+  return file;
+}
+
+void BaseToJson(const std::optional<StoredFile>& base, Json& object) {
+  if (base) object["base"] = JsonFromStoredFile(*base);
+}
+
 // Fills the view's depth fields; returns what was not known.
 Json DepthFrom(const JsonObject& object, View& view) {
   view.depth_file = StoredFileFromJson(object);
@@ -133,6 +146,9 @@ Json DepthFrom(const JsonObject& object, View& view) {
   if (view.depth_coding == DepthCoding::kZstdInverseDepth) {
     view.depth_steps = object.PositiveInt("steps");
     if (view.depth_steps > InverseDepthCode::kSteps) object.Fail("steps", "1 to 65534");
+    view.depth_base = BaseFrom(object);
+  } else if (object.Has("base")) {
+    object.Fail("base", "a base beside zstd-inverse only");
   }
   if (object.String("kind") != "plane-z") object.Fail("kind", "\"plane-z\"");
   view.depth_scale = object.PositiveInt("scale");
@@ -150,6 +166,7 @@ Json DepthFrom(const JsonObject& object, View& view) {
 // The same for the completed depth.
 Json CompletedFrom(const JsonObject& object, View& view) {
   view.completed_file = StoredFileFromJson(object);
+  view.completed_base = BaseFrom(object);
   view.completed_steps = object.PositiveInt("steps");
   if (view.completed_steps > InverseDepthCode::kSteps) object.Fail("steps", "1 to 65534");
   view.completed_near_z = object.Positive("near_z");
@@ -163,6 +180,7 @@ Json CompletedToJson(const View& view) {
   completed["steps"] = view.completed_steps;
   completed["near_z"] = view.completed_near_z;
   completed["far_z"] = view.completed_far_z;
+  BaseToJson(view.completed_base, completed);
   return completed;
 }
 
@@ -174,6 +192,7 @@ Json DepthToJson(const View& view) {
   depth["scale"] = view.depth_scale;
   depth["near_z"] = view.near_z;
   depth["far_z"] = view.far_z;
+  BaseToJson(view.depth_base, depth);
   return depth;
 }
 
@@ -195,6 +214,7 @@ void FilesFrom(const JsonObject& object, View& view, Json& extra) {
     // set.json does not tell what a held-out file contains; held_out/files.json does.
     const bool told_elsewhere = view.role == ViewRole::kHeldOut && !entry.Has("sha256");
     file = told_elsewhere ? StoredFile{PathFrom(entry), "", 0} : StoredFileFromJson(entry);
+    if (key == "sigma") view.sigma_base = BaseFrom(entry);
     Nest(extra, key, entry.Unknown());
   };
   read("image", view.image_file);
@@ -223,6 +243,9 @@ void FilesFrom(const JsonObject& object, View& view, Json& extra) {
   ExpectFolder(object, view, view.sigma_file, "sigma");
   ExpectFolder(object, view, view.mesh_file, "mesh");
   ExpectFolder(object, view, view.completed_file, "completed_depth");
+  ExpectFolder(object, view, view.depth_base, "depth.base");
+  ExpectFolder(object, view, view.completed_base, "completed_depth.base");
+  ExpectFolder(object, view, view.sigma_base, "sigma.base");
 }
 
 View ViewFrom(const JsonObject& object) {
@@ -276,7 +299,10 @@ Json ToJson(const View& view, Hashes hashes) {
   if (view.mask_file) object["mask"] = entry(*view.mask_file);
   if (view.depth_file) object["depth"] = DepthToJson(view);
   if (view.completed_file) object["completed_depth"] = CompletedToJson(view);
-  if (view.sigma_file) object["sigma"] = entry(*view.sigma_file);
+  if (view.sigma_file) {
+    object["sigma"] = entry(*view.sigma_file);
+    BaseToJson(view.sigma_base, object["sigma"]);
+  }
   if (view.mesh_file) object["mesh"] = entry(*view.mesh_file);
   object["reference_baseline"] = view.reference_baseline;
   object["gain_linear_rgb"] = NumbersToJson(view.gain);
@@ -289,8 +315,8 @@ Json ToJson(const View& view, Hashes hashes) {
 void ExpectVersion(const JsonObject& root) {
   if (root.String("format") != kFormatName) root.Fail("format", "\"dtr-set\"");
   const int version = root.PositiveInt("format_version");
-  if (version != kFormatVersion) {
-    root.Fail("format_version", std::to_string(kFormatVersion),
+  if (version > kNewestFormatVersion) {
+    root.Fail("format_version", "1 to " + std::to_string(kNewestFormatVersion),
               std::to_string(version) + "; read it with the version of dtr that wrote it");
   }
 }
@@ -364,6 +390,16 @@ DtrSet SetFrom(const JsonObject& root) {
 
 }  // namespace
 
+int FormatVersionOf(const DtrSet& set) {
+  const auto needs_second = [](const View& view) {
+    return view.depth_base || view.completed_base || view.sigma_base || view.image_frame;
+  };
+  for (const Frame& frame : set.frames) {
+    if (std::any_of(frame.views.begin(), frame.views.end(), needs_second)) return 2;
+  }
+  return 1;
+}
+
 StoredFile StoredFileFromJson(const JsonObject& object) {
   StoredFile file{PathFrom(object), object.String("sha256"), object.Unsigned("bytes")};
   if (!IsHexSha256(file.sha256)) object.Fail("sha256", "64 lower-case hexadecimal digits");
@@ -389,7 +425,7 @@ DtrSet SetFromJson(const std::string& text, const std::string& file) {
 
 std::string JsonFromSet(const DtrSet& set, const std::string& file) {
   Json root = {{"format", kFormatName},
-               {"format_version", kFormatVersion},
+               {"format_version", FormatVersionOf(set)},
                {"unit", NameOf(set.unit)},
                {"world_origin", NumbersToJson(set.world_origin)},
                {"scene_center", NumbersToJson(set.scene_center)}};
@@ -434,8 +470,11 @@ std::vector<NamedFile> FilesOf(const DtrSet& set) {
       add(view.image_file, field + "image");
       add(view.mask_file, field + "mask");
       add(view.depth_file, field + "depth");
+      add(view.depth_base, field + "depth.base");
       add(view.completed_file, field + "completed_depth");
+      add(view.completed_base, field + "completed_depth.base");
       add(view.sigma_file, field + "sigma");
+      add(view.sigma_base, field + "sigma.base");
       add(view.mesh_file, field + "mesh", true);
     }
   }

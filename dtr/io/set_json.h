@@ -10,7 +10,10 @@
 namespace dtr::io {
 
 inline constexpr char kSetFile[] = "set.json";
-inline constexpr int kFormatVersion = 1;
+inline constexpr int kNewestFormatVersion = 2;  ///< that is read
+/// The lowest version whose readers know all that the set has: 2 where files are differences to a
+/// base or frames of a video, else 1.
+int FormatVersionOf(const DtrSet& set);
 
 /// Parses and checks everything that needs no other file. `file` stands in front of every error.
 /// Files of held-out views come without hash and size (dtr/io/held_out_files.h).

@@ -91,11 +91,17 @@ bool AreDuplicates(const View& a, const View& b) {
          same(a.sigma_file, b.sigma_file) && same_completed;
 }
 
+std::optional<BaseFile> BaseIn(const fs::path& set_folder, const std::optional<StoredFile>& base) {
+  if (!base) return {};
+  return BaseFile{set_folder / base->path, base->sha256};
+}
+
 /// Puts the completed depths of the view into the holes of its measured ones.
 void ReadCompleted(const fs::path& set_folder, View& view) {
   const fs::path file = set_folder / view.completed_file->path;
   const DepthImage completed =
-      ReadDepth(file, CompletedFormatOf(view), view.depth.width(), view.depth.height());
+      ReadDepth(file, CompletedFormatOf(view), view.depth.width(), view.depth.height(),
+                BaseIn(set_folder, view.completed_base));
   for (size_t p = 0; p < completed.grid().data().size(); ++p) {
     if (DepthImage::IsHole(completed.grid().data()[p]) ||
         DepthImage::IsHole(view.depth.grid().data()[p])) {
@@ -149,8 +155,8 @@ void LoadPixels(const fs::path& set_folder, View& view, const LoadOptions& optio
   if (options.depth && view.depth_file) {
     // The unit was checked with set.json, and reading does not depend on it.
     const DepthFormat format = FormatOf(view, LengthUnit::kUnknown);
-    view.depth =
-        ReadDepth(set_folder / view.depth_file->path, format, depth_width_px, depth_height_px);
+    view.depth = ReadDepth(set_folder / view.depth_file->path, format, depth_width_px,
+                           depth_height_px, BaseIn(set_folder, view.depth_base));
   }
   const bool completes = options.depth && options.completed && view.completed_file;
   view.depth_state = {};
@@ -162,8 +168,8 @@ void LoadPixels(const fs::path& set_folder, View& view, const LoadOptions& optio
     view.mesh = UsableMesh(set_folder, view, options);
   }
   if (options.sigma && view.sigma_file) {
-    view.inverse_depth_sigma =
-        ReadSigma(set_folder / view.sigma_file->path, depth_width_px, depth_height_px);
+    view.inverse_depth_sigma = ReadSigma(set_folder / view.sigma_file->path, depth_width_px,
+                                         depth_height_px, BaseIn(set_folder, view.sigma_base));
   }
 }
 

@@ -28,8 +28,8 @@ constexpr char kLock[] = "work/lock";
 constexpr char kSparseFile[] = "sparse.bin";
 constexpr char kReportFolder[] = "report";
 constexpr std::uintmax_t kRecordLimitBytes = 1 << 24;
-constexpr const char* kPixelFolders[] = {"images", "mask", "depth",   "completed",
-                                         "sigma",  "mesh", "held_out"};
+constexpr const char* kPixelFolders[] = {"images", "mask", "depth", "completed",
+                                         "sigma",  "mesh", "still", "held_out"};
 
 // "a/b.dtr/" and "a/b.dtr" are one folder.
 fs::path WithoutSlash(const fs::path& target) {
@@ -370,6 +370,7 @@ void SetWriter::State::WriteView(View& view, LengthUnit unit) const {
     view.sigma_file = Store(PathOf(view, "sigma", ".exr"), [&](const fs::path& file) {
       WriteSigma(file, *view.inverse_depth_sigma);
     });
+    view.sigma_base.reset();
   }
   // Written last: a record stands for files that are whole.
   const fs::path record = RecordOf(view.id);
@@ -384,6 +385,7 @@ void SetWriter::State::WriteDepthFile(View& view, LengthUnit unit) const {
   const DepthImage measured = MeasuredDepth(view);
   view.depth_file = Store(PathOf(view, "depth", ExtensionOf(view.depth_coding)),
                           [&](const fs::path& file) { WriteDepth(file, measured, format); });
+  view.depth_base.reset();
   if (!view.depth_state.empty()) WriteCompletedFile(CompletedDepth(view), view);
   view.mesh_file.reset();  // it was of other depth
   view.mesh.reset();
@@ -393,6 +395,7 @@ void SetWriter::State::WriteCompletedFile(const DepthImage& completed, View& vie
   const DepthFormat format = CompletedFormatOf(view);
   view.completed_file = Store(PathOf(view, "completed", ExtensionOf(format.coding)),
                               [&](const fs::path& file) { WriteDepth(file, completed, format); });
+  view.completed_base.reset();
   view.mesh_file.reset();  // it was without it
   view.mesh.reset();
 }
@@ -425,16 +428,14 @@ void SetWriter::WriteJpeg(View& view, int quality) {
 }
 
 void SetWriter::CopyFiles(const fs::path& set_folder, const View& view) {
-  for (const auto* file : {&view.image_file, &view.mask_file, &view.depth_file,
-                           &view.completed_file, &view.sigma_file, &view.mesh_file}) {
-    if (!*file) continue;
+  for (const StoredFile* file : StoredFilesOf(view)) {
     const StoredFile copied = AsError([&] {
-      return state_->Store((*file)->path, [&](const fs::path& target) {
-        CopyFileAtomically(set_folder / (*file)->path, target);
+      return state_->Store(file->path, [&](const fs::path& target) {
+        CopyFileAtomically(set_folder / file->path, target);
       });
     });
-    if (copied == **file) continue;
-    throw Error((set_folder / (*file)->path).string() +
+    if (copied == *file) continue;
+    throw Error((set_folder / file->path).string() +
                 ": expected the content that the set records, found another; dtr info with "
                 "`verify` names every such file");
   }
@@ -459,11 +460,10 @@ bool SetWriter::State::RestoreView(View& view) const {
       stored.cam_from_world.rotation.coeffs() == view.cam_from_world.rotation.coeffs() &&
       stored.cam_from_world.translation == view.cam_from_world.translation;
   if (!same_view) return false;
-  for (const auto* file : {&stored.image_file, &stored.mask_file, &stored.depth_file,
-                           &stored.completed_file, &stored.sigma_file}) {
-    if (!*file) continue;
-    const fs::path full = partial / (*file)->path;
-    if (!fs::is_regular_file(full) || Sha256OfFile(full) != (*file)->sha256) return false;
+  stored.mesh_file.reset();
+  for (const StoredFile* file : StoredFilesOf(stored)) {
+    const fs::path full = partial / file->path;
+    if (!fs::is_regular_file(full) || Sha256OfFile(full) != file->sha256) return false;
   }
   view.image_file = stored.image_file;
   view.mask_file = stored.mask_file;
@@ -473,6 +473,9 @@ bool SetWriter::State::RestoreView(View& view) const {
   view.completed_near_z = stored.completed_near_z;
   view.completed_far_z = stored.completed_far_z;
   view.sigma_file = stored.sigma_file;
+  view.depth_base = stored.depth_base;
+  view.completed_base = stored.completed_base;
+  view.sigma_base = stored.sigma_base;
   view.depth_coding = stored.depth_coding;
   view.depth_steps = stored.depth_steps;
   view.depth_scale = stored.depth_scale;

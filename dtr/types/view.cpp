@@ -47,12 +47,23 @@ void AddCompletedDepth(const DepthImage& completed, View& view) {
   }
 }
 
+std::vector<const StoredFile*> StoredFilesOf(const View& view) {
+  std::vector<const StoredFile*> files;
+  for (const auto* file :
+       {&view.image_file, &view.mask_file, &view.depth_file, &view.depth_base, &view.completed_file,
+        &view.completed_base, &view.sigma_file, &view.sigma_base, &view.mesh_file}) {
+    if (*file) files.push_back(&**file);
+  }
+  return files;
+}
+
 void DropDepth(View& view) {
   view.depth = {};
   view.depth_state = {};
   view.inverse_depth_sigma.reset();
   view.mesh.reset();
-  for (auto* file : {&view.depth_file, &view.completed_file, &view.sigma_file, &view.mesh_file}) {
+  for (auto* file : {&view.depth_file, &view.completed_file, &view.sigma_file, &view.mesh_file,
+                     &view.depth_base, &view.completed_base, &view.sigma_base}) {
     file->reset();
   }
   view.near_z = view.far_z = view.completed_near_z = view.completed_far_z = 0;

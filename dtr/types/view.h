@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "dtr/types/block_cover.h"
 #include "dtr/types/camera.h"
@@ -71,6 +72,10 @@ struct View {
 
   std::optional<StoredFile> image_file, depth_file, sigma_file, mask_file, mesh_file,
       completed_file;
+  std::optional<int> image_frame;  ///< which frame of image_file, a video; empty: it is an image
+  /// What depth_file, completed_file and sigma_file are differences to (docs/FORMAT.md, 4.3);
+  /// empty: they are whole by themselves.
+  std::optional<StoredFile> depth_base, completed_base, sigma_base;
   std::optional<StoredMesh> mesh;  ///< of mesh_file, for this very depth and mask; may be absent
   std::string extra_json;          ///< fields this version does not know, kept verbatim ("" = none)
 
@@ -79,6 +84,8 @@ struct View {
   Eigen::Vector3d CenterInWorld() const { return cam_from_world.TargetOriginInSource(); }
 };
 
+/// All files that a view names, bases included, those that it has.
+std::vector<const StoredFile*> StoredFilesOf(const View& view);
 /// The depth map without what was completed.
 DepthImage MeasuredDepth(const View& view);
 /// What was completed of it alone, 0 elsewhere; empty where nothing was.
