@@ -316,7 +316,7 @@ void ExpectVersion(const JsonObject& root) {
   if (root.String("format") != kFormatName) root.Fail("format", "\"dtr-set\"");
   const int version = root.PositiveInt("format_version");
   if (version > kNewestFormatVersion) {
-    root.Fail("format_version", "1 to " + std::to_string(kNewestFormatVersion),
+    root.Fail("format_version", "1 or " + std::to_string(kNewestFormatVersion),
               std::to_string(version) + "; read it with the version of dtr that wrote it");
   }
 }

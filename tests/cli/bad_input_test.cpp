@@ -206,7 +206,7 @@ TEST_F(BadInput, SetsCutShort) {
 
 TEST_F(BadInput, SetsWithWrongFields) {
   ExpectRejected(InfoAfter("\"format_version\": 1", "\"format_version\": 7"), kFailed,
-                 "format_version: expected 1, found 7");
+                 "format_version: expected 1 or 2, found 7");
   ExpectRejected(InfoAfter("\"translation\": [", "\"translation\": [NaN, "), kFailed,
                  "expected JSON, found an error after byte");
   ExpectRejected(InfoAfter("\"translation\": [", "\"translation\": [null, "), kFailed,

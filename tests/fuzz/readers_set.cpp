@@ -2,6 +2,8 @@
 #include <cmath>
 
 #include "dtr/base/files.h"
+#include "dtr/base/hash.h"
+#include "dtr/io/code_differences.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/formats/cameras_json.h"
 #include "dtr/io/mesh_io.h"
@@ -66,6 +68,21 @@ Reader OpenDepth(const fs::path& folder, DepthCoding coding) {
 template <DepthCoding coding>
 Reader OpenDepthOf(const fs::path& folder) {
   return OpenDepth(folder, coding);
+}
+
+// Differences to a base that is there and whole.
+Reader OpenDifferences(const fs::path& folder) {
+  const io::DepthFormat format{DepthCoding::kZstdInverseDepth, 1, 10, LengthUnit::kMetre};
+  const fs::path base = folder / "base.dtz", file = folder / "differences.dtd";
+  io::WriteDepth(base, SomeDepth(), format);
+  const auto of_base = io::ReadDepthCodes(base, format, kWidth, kHeight);
+  auto codes = of_base;
+  for (size_t i = 0; i < codes.data().size(); i += 5) codes.data()[i] = i % 2 == 0 ? 0 : 900;
+  const std::string sha256 = Sha256OfFile(base);
+  WriteFileAtomically(file, io::EncodeDifferences(codes, of_base, sha256));
+  return {file, {ReadFile(file, kSeedLimitBytes)}, [=] {
+            io::ReadDepth(file, format, kWidth, kHeight, io::BaseFile{base, sha256});
+          }};
 }
 
 Reader OpenSigma(const fs::path& folder) {
@@ -133,6 +150,7 @@ constexpr ReaderKind kReaders[] = {
     {"depth-float", OpenDepthOf<DepthCoding::kExrFloat>},
     {"depth-half", OpenDepthOf<DepthCoding::kExrHalf>},
     {"depth-zstd", OpenDepthOf<DepthCoding::kZstdInverseDepth>},
+    {"depth-differences", OpenDifferences},
     {"held-out-files", OpenHeldOutFiles},
     {"sigma", OpenSigma},
     {"sparse", OpenSparse},

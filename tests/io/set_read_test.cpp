@@ -103,8 +103,8 @@ TEST_F(EditedSet, ErrorsNameFileFieldExpectedAndFound) {
 }
 
 TEST_F(EditedSet, WrongVersionsAndFormatsAreRejected) {
-  EXPECT_THAT(ErrorAfter("", "\"format_version\": 1", "\"format_version\": 2"),
-              HasSubstr("format_version: expected 1, found 2"));
+  EXPECT_THAT(ErrorAfter("", "\"format_version\": 1", "\"format_version\": 3"),
+              HasSubstr("format_version: expected 1 or 2, found 3"));
   EXPECT_THAT(ErrorAfter("", "\"format_version\": 1", "\"format_version\": \"1\""),
               HasSubstr("format_version"));
   EXPECT_THAT(ErrorAfter("", "dtr-set", "cameras"), HasSubstr("format: expected"));
