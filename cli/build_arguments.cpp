@@ -41,6 +41,12 @@ void AddDynamicOptions(CLI::App& command, BuildArguments& arguments) {
                   "stands still keeps one depth; off: every time step alone [on]")
       ->check(CLI::IsMember({"on", "off"}))
       ->needs(dynamic);
+  command
+      .add_option("--video", arguments.video,
+                  "With --dynamic: store the images of source cameras as H.264 videos of this rate "
+                  "factor, 1 (largest) to 51, or lossless [every image a PNG]")
+      ->needs(dynamic)
+      ->type_name("CRF");
 }
 
 // What processes that share a build are given.
@@ -140,6 +146,7 @@ void FinishBuildArguments(const CommonOptions& common, BuildArguments& arguments
   options.seed = common.seed;
   options.part = PartFrom(arguments);
   arguments.dynamic.temporal = arguments.temporal == "on";
+  if (!arguments.video.empty()) arguments.dynamic.video = io::VideoQualityFrom(arguments.video);
 }
 
 }  // namespace dtr::cli

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 
 #include "calib/undistort.h"
 #include "capture/video/frames.h"
@@ -22,6 +24,7 @@
 #include "pipeline/detail/dynamic/fixed_cameras.h"
 #include "pipeline/detail/dynamic/recording.h"
 #include "pipeline/detail/dynamic/step_depth.h"
+#include "pipeline/detail/dynamic/still_completion.h"
 #include "pipeline/detail/pages/set_page.h"
 #include "pipeline/detail/photos/holdout.h"
 #include "pipeline/detail/photos/input_hash.h"
@@ -58,6 +61,7 @@ void RequireDynamicOptions(const BuildOptions& options, const DynamicOptions& dy
          "`force_stage` does not go with it; delete the partial set to begin again");
   Reject(options.video.most > 0, "takes every time step; give `every`, `from` and `to`");
   Reject(options.panoramas == capture::PanoramaUse::kAlways, "panoramas do not go with it");
+  if (dynamic.video) io::RequireVideoEncoder();
   Reject(dynamic.fps && !(*dynamic.fps > 0), "`fps`: expected a positive number");
 }
 
@@ -84,11 +88,13 @@ Json DynamicJson(const Recording& recording, const BuildOptions& options,
                  const DynamicOptions& dynamic, bool temporal) {
   Json names = Json::array();
   for (const RecordedStep& step : recording.steps()) names.push_back(step.name);
-  return {{"cameras", recording.cameras()},
-          {"time_steps", names},
-          {"every", std::max(1, options.video.every)},
-          {"fps", dynamic.fps.value_or(0)},
-          {"temporal", temporal}};
+  Json json = {{"cameras", recording.cameras()},
+               {"time_steps", names},
+               {"every", std::max(1, options.video.every)},
+               {"fps", dynamic.fps.value_or(0)},
+               {"temporal", temporal}};
+  if (dynamic.video) json["video"] = io::NameOf(*dynamic.video);
+  return json;
 }
 
 // One camera after the other, so that every video is decoded once: its images on the views' grid.
@@ -138,16 +144,24 @@ void WriteImages(const Recording& recording, const FixedCameras& cameras,
 
 // What every time step gets once its depth is there.
 void FinishViews(const SparseScene& points, const BuildOptions& options, double memory_gb,
-                 io::SetWriter& writer, DtrSet& set, Progress& progress) {
-  progress.Stage("finishing time steps", static_cast<int>(set.frames.size()));
+                 std::optional<BackgroundViews> backgrounds, io::SetWriter& writer, DtrSet& set,
+                 Progress& progress) {
   QuietProgress quiet(progress);
+  std::optional<StillCompletion> still_completed;
+  if (options.depth.completion && backgrounds) {
+    still_completed.emplace(std::move(*backgrounds), points, set.frames.front().views, writer,
+                            options.threads, memory_gb, quiet);
+  }
+  progress.Stage("finishing time steps", static_cast<int>(set.frames.size()));
   for (size_t step = 0; step < set.frames.size(); ++step) {
     DtrSet still = TakeStep(set, step);
     if (options.depth.depth_error_px) {
       RecodeDepth(still, *options.depth.depth_error_px, writer, options.threads, memory_gb, quiet);
     }
     if (options.depth.completion) {
-      CompleteDepth(still, points, writer, options.threads, memory_gb, quiet);
+      CompleteDepth(
+          still, points, writer, options.threads, memory_gb, quiet,
+          still_completed ? still_completed->Of(still.frames.front().views) : KnownCompletion());
     }
     PutBack(std::move(still), step, set);
     progress.Update(static_cast<int>(step) + 1);
@@ -208,12 +222,16 @@ BuildReport BuildDynamicSet(const BuildOptions& asked, const DynamicOptions& dyn
   WriteImages(recording, cameras, held_out, options, set.unit, writer, set.frames, progress);
 
   log.Begin("depth");
-  ComputeStepDepths(set, cameras.all_points,
-                    {options.depth, quality, temporal, options.threads, options.seed}, writer,
-                    progress);
+  std::optional<BackgroundViews> backgrounds = ComputeStepDepths(
+      set, cameras.all_points, {options.depth, quality, temporal, options.threads, options.seed},
+      writer, progress);
 
   log.Begin("finishing");
-  FinishViews(cameras.sparse, options, memory_gb, writer, set, progress);
+  FinishViews(cameras.sparse, options, memory_gb, std::move(backgrounds), writer, set, progress);
+  if (dynamic.video) {
+    io::StoreCameraVideos(writer.folder(), writer.work_folder(), set, *dynamic.video,
+                          options.threads, memory_gb, progress);
+  }
   Json provenance =
       ProvenanceJson(options, OptionsJson(options, quality), files, cameras.calibrated, report);
   provenance["dynamic"] = dynamic_json;

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "dtr/base/progress.h"
+#include "dtr/io/camera_videos.h"
 #include "pipeline/build.h"
 
 namespace dtr::pipeline {
@@ -17,6 +18,8 @@ struct DynamicOptions {
   /// Depth begins with that of the time step before, and what does not move keeps one depth for
   /// all; false: every time step alone.
   bool temporal = true;
+  /// Images of source cameras as videos; empty: every one a PNG.
+  std::optional<io::VideoQuality> video;
 };
 
 /// Builds a set with a frame for each time step. Views are named as their cameras (videos or

@@ -80,6 +80,7 @@ void WriteViews(const fs::path& folder, size_t index, Frame& frame, LengthUnit u
                        &joined.depth_base, &joined.completed_base, &joined.sigma_base}) {
       file->reset();
     }
+    joined.image_frame.reset();
     const bool written = writer.RestoreView(joined);  // by a run that was interrupted
     load.images = load.sigma = !written;
     if (!written || view.mesh_file) io::LoadPixels(folder, view, load);

@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <fstream>
-#include <mutex>
 #include <string_view>
 
 #include "dtr/base/error.h"
@@ -20,12 +19,6 @@ extern "C" {
 namespace dtr::capture {
 namespace fs = std::filesystem;
 namespace {
-
-// FFmpeg writes about damaged frames on standard error as it goes; we report once what is missing.
-void QuietFfmpeg() {
-  static std::once_flag once;
-  std::call_once(once, [] { av_log_set_level(AV_LOG_QUIET); });
-}
 
 // Packets begin with 0x47: of 188 bytes, or of 192 where 4 bytes of time stand before each, as
 // camcorders (AVCHD) and Blu-ray discs write them.

@@ -27,13 +27,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Of the files of a view, those that it has with other time steps left out.
+// Of the files that are a view's own: no base, and no video of several time steps.
 std::uint64_t BytesOf(const View& view) {
   std::uint64_t bytes = 0;
-  for (const auto* file : {&view.image_file, &view.mask_file, &view.depth_file,
-                           &view.completed_file, &view.sigma_file, &view.mesh_file}) {
+  for (const auto* file : {&view.mask_file, &view.depth_file, &view.completed_file,
+                           &view.sigma_file, &view.mesh_file}) {
     if (*file) bytes += (*file)->bytes;
   }
+  if (view.image_file && !view.image_frame) bytes += view.image_file->bytes;
   return bytes;
 }
 

@@ -13,6 +13,7 @@
 #include "dtr/io/set_io.h"
 #include "dtr/io/set_json.h"
 #include "dtr/io/sparse_io.h"
+#include "dtr/io/video_frames.h"
 
 namespace dtr::io {
 namespace {
@@ -84,7 +85,8 @@ bool AreDuplicates(const View& a, const View& b) {
   const bool same_completed =
       same(a.completed_file, b.completed_file) && a.completed_steps == b.completed_steps &&
       a.completed_near_z == b.completed_near_z && a.completed_far_z == b.completed_far_z;
-  return a.image_file && a.role == b.role && a.camera == b.camera &&
+  return a.image_file && a.image_frame == b.image_frame && a.role == b.role &&
+         a.camera == b.camera &&
          a.cam_from_world.rotation.coeffs() == b.cam_from_world.rotation.coeffs() &&
          a.cam_from_world.translation == b.cam_from_world.translation &&
          same(a.image_file, b.image_file) && same(a.mask_file, b.mask_file) && same_depth &&
@@ -140,9 +142,14 @@ DtrSet ReadSet(const fs::path& set_folder) {
 void LoadPixels(const fs::path& set_folder, View& view, const LoadOptions& options) {
   if (options.images && view.image_file) {
     const fs::path file = set_folder / view.image_file->path;
-    const ImageHeader header = ReadImageHeader(file);
-    ExpectViewSize(file, view, header.width_px, header.height_px);
-    view.image = ReadImage(file);
+    if (view.image_frame) {
+      view.image = ReadVideoFrame(file, view.image_file->sha256, *view.image_frame,
+                                  view.camera.width_px(), view.camera.height_px());
+    } else {
+      const ImageHeader header = ReadImageHeader(file);
+      ExpectViewSize(file, view, header.width_px, header.height_px);
+      view.image = ReadImage(file);
+    }
   }
   if (options.images && view.mask_file) {
     const fs::path file = set_folder / view.mask_file->path;

@@ -28,8 +28,8 @@ constexpr char kLock[] = "work/lock";
 constexpr char kSparseFile[] = "sparse.bin";
 constexpr char kReportFolder[] = "report";
 constexpr std::uintmax_t kRecordLimitBytes = 1 << 24;
-constexpr const char* kPixelFolders[] = {"images", "mask", "depth", "completed",
-                                         "sigma",  "mesh", "still", "held_out"};
+constexpr const char* kPixelFolders[] = {"images", "mask",  "depth", "completed", "sigma",
+                                         "mesh",   "still", "video", "held_out"};
 
 // "a/b.dtr/" and "a/b.dtr" are one folder.
 fs::path WithoutSlash(const fs::path& target) {
@@ -353,6 +353,7 @@ void SetWriter::State::WriteView(View& view, LengthUnit unit) const {
     const bool jpeg = image_coding == ImageCoding::kJpeg && view.role == ViewRole::kSource;
     view.image_file = Store(PathOf(view, "images", jpeg ? ".jpg" : ".png"),
                             [&](const fs::path& file) { WriteImage(file, view.image); });
+    view.image_frame.reset();
   }
   if (!view.mask.empty()) {
     view.mask_file = Store(PathOf(view, "mask", ".png"),
@@ -425,6 +426,7 @@ void SetWriter::WriteJpeg(View& view, int quality) {
     return state_->Store(state_->PathOf(view, "images", ".jpg"),
                          [&](const fs::path& file) { WriteImage(file, view.image, quality); });
   });
+  view.image_frame.reset();
 }
 
 void SetWriter::CopyFiles(const fs::path& set_folder, const View& view) {
@@ -466,6 +468,7 @@ bool SetWriter::State::RestoreView(View& view) const {
     if (!fs::is_regular_file(full) || Sha256OfFile(full) != file->sha256) return false;
   }
   view.image_file = stored.image_file;
+  view.image_frame = stored.image_frame;
   view.mask_file = stored.mask_file;
   view.depth_file = stored.depth_file;
   view.completed_file = stored.completed_file;

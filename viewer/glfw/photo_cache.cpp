@@ -40,6 +40,7 @@ void PhotoCache::Begin(const View& view) {
   described.role = view.role;
   described.camera = view.camera;
   described.image_file = view.image_file;
+  described.image_frame = view.image_frame;
   reading_ = std::async(std::launch::async, [load = load_, described, at = &view] {
     Read read;
     read.view = at;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "dtr/base/memory_budget.h"
@@ -30,12 +31,16 @@ View Loaded(const View& view, const io::SetWriter& writer) {
   return loaded;
 }
 
-/// The range of what was completed, and steps that do not show.
-void ChooseCoding(const DepthImage& completed, double far_z, View& view) {
+double NearestOf(const DepthImage& completed, double far_z) {
   double near_z = far_z / 2;
   for (const float z : completed.grid().data()) {
     if (z > 0) near_z = std::min(near_z, static_cast<double>(z));
   }
+  return near_z;
+}
+
+/// The range of what was completed, and steps that do not show.
+void ChooseCoding(double near_z, double far_z, View& view) {
   view.completed_near_z = near_z;
   view.completed_far_z = far_z;
   const double steps = (1 / near_z - 1 / far_z) / (kStepPx * ThresholdsOf(view, {}).pixel);
@@ -43,10 +48,40 @@ void ChooseCoding(const DepthImage& completed, double far_z, View& view) {
       static_cast<int>(std::clamp<double>(std::ceil(steps), 1, InverseDepthCode::kSteps));
 }
 
+/// Puts depths nearer than `below_z` into the view's holes.
+void Fill(const DepthImage& known, float below_z, View& view) {
+  for (size_t p = 0; p < known.grid().data().size(); ++p) {
+    const float z = known.grid().data()[p];
+    if (!DepthImage::IsHole(z) && z < below_z) view.depth.grid().data()[p] = z;
+  }
+}
+
+/// Of one view, from the planes of its cells; sets its coding.
+DepthImage Completed(const stereo::CellView& cells, const stereo::CompletedCells& completed,
+                     float far_z, View loaded, size_t index, const KnownCompletion& known,
+                     View& view) {
+  if (!known.depth) {
+    DepthImage depth = stereo::ExpandCells(loaded, cells, completed, far_z);
+    ChooseCoding(NearestOf(depth, static_cast<double>(far_z)), static_cast<double>(far_z), view);
+    return depth;
+  }
+  const DepthImage before = known.depth(index, loaded);
+  Fill(before, std::numeric_limits<float>::infinity(), loaded);
+  DepthImage depth = stereo::ExpandCells(loaded, cells, completed, far_z);
+  const double near_z = known.near_z(index);
+  for (size_t p = 0; p < before.grid().data().size(); ++p) {
+    float& z = depth.grid().data()[p];
+    if (DepthImage::IsHole(z)) z = before.grid().data()[p];
+    if (!DepthImage::IsHole(z)) z = std::clamp(z, static_cast<float>(near_z), far_z);
+  }
+  ChooseCoding(near_z, static_cast<double>(far_z), view);
+  return depth;
+}
+
 }  // namespace
 
 void CompleteDepth(DtrSet& set, const SparseScene& sparse, io::SetWriter& writer, int threads,
-                   double memory_gb, Progress& progress) {
+                   double memory_gb, Progress& progress, const KnownCompletion& known) {
   std::vector<View>& views = set.frames.front().views;
   std::vector<int> sources;
   std::vector<PinholeCamera> cameras;
@@ -65,12 +100,16 @@ void CompleteDepth(DtrSet& set, const SparseScene& sparse, io::SetWriter& writer
         bytes / kBytesPerGigabyte));
     return;
   }
+  const auto far_z = static_cast<float>(kFarthest * farthest);
   std::vector<stereo::CellView> cells(sources.size());
   const int count = static_cast<int>(sources.size());
   ParallelFor(0, count, threads, [&](int i) {
     progress.ThrowIfInterrupted();
-    const View& view = views[static_cast<size_t>(sources[static_cast<size_t>(i)])];
-    cells[static_cast<size_t>(i)] = stereo::MakeCells(Loaded(view, writer));
+    const auto v = static_cast<size_t>(sources[static_cast<size_t>(i)]);
+    View view = Loaded(views[v], writer);
+    // What is far is no surface that goes on.
+    if (known.depth) Fill(known.depth(v, view), far_z, view);
+    cells[static_cast<size_t>(i)] = stereo::MakeCells(view);
   });
   const bool measured = std::ranges::any_of(cells, [](const stereo::CellView& of_view) {
     return std::ranges::any_of(of_view.inverse_depth.data(), [](float w) { return w > 0; });
@@ -82,16 +121,14 @@ void CompleteDepth(DtrSet& set, const SparseScene& sparse, io::SetWriter& writer
   const auto neighbours =
       NeighboursOf(views, sources, SourceScene(sparse, views, sources), kNeighbours);
   const auto completed = stereo::CompleteCells(cells, neighbours, threads, progress);
-  const auto far_z = static_cast<float>(kFarthest * farthest);
   progress.Stage("completed depth", count);
   for (int i = 0; i < count; ++i) {
     progress.ThrowIfInterrupted();
     const auto k = static_cast<size_t>(i);
-    View& view = views[static_cast<size_t>(sources[k])];
+    const auto v = static_cast<size_t>(sources[k]);
     const DepthImage depth =
-        stereo::ExpandCells(Loaded(view, writer), cells[k], completed[k], far_z);
-    ChooseCoding(depth, static_cast<double>(far_z), view);
-    writer.WriteCompleted(depth, view);
+        Completed(cells[k], completed[k], far_z, Loaded(views[v], writer), v, known, views[v]);
+    writer.WriteCompleted(depth, views[v]);
     progress.Update(i + 1);
   }
 }

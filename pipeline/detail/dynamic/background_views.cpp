@@ -122,6 +122,13 @@ BackgroundViews MakeBackgroundViews(const DtrSet& dynamic, io::SetWriter& writer
   return backgrounds;
 }
 
+Mask OpenPixels(const View& background, const View& now, const io::SetWriter& writer, int threads) {
+  stereo::Background behind;
+  ReadSupport(SupportFile(writer, background), &behind);
+  behind.image = background.image;
+  return stereo::ChangedPixels(now.image, now.mask, behind, threads);
+}
+
 std::uint64_t TimeStepBytesOf(const std::vector<View>& views) {
   std::uint64_t bytes = 0;
   for (const View& view : views) bytes += stereo::TimeStepBytes(view.camera);
@@ -176,11 +183,8 @@ std::shared_ptr<const stereo::TimeStep> TimeStepReader::Read(size_t view) {
   load.threads = threads_;
   io::LoadPixels(writer_.folder(), behind, load);
   const View now = LoadedImage(writer_, views_[view], threads_);
-  stereo::Background background;
-  ReadSupport(SupportFile(writer_, behind), &background);
-  background.image = std::move(behind.image);
   auto time_step = std::make_shared<stereo::TimeStep>();
-  time_step->open = stereo::ChangedPixels(now.image, now.mask, background, threads_);
+  time_step->open = OpenPixels(behind, now, writer_, threads_);
   time_step->settled = {std::move(behind.depth), std::move(*behind.inverse_depth_sigma)};
   const int source = static_cast<int>(view);
   time_step->background = *background_planes_.Load(round_, source);

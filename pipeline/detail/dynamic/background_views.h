@@ -28,6 +28,10 @@ struct BackgroundViews {
 BackgroundViews MakeBackgroundViews(const DtrSet& dynamic, io::SetWriter& writer, int threads,
                                     Progress& progress);
 
+/// Where a view of a time step, loaded with image and mask, shows something else than its
+/// background (a view of `set`, loaded with its image): 255, else 0.
+Mask OpenPixels(const View& background, const View& now, const io::SetWriter& writer, int threads);
+
 /// Fewer time steps say nothing of what stands still.
 inline constexpr size_t kLeastTimeSteps = 3;
 

@@ -58,7 +58,7 @@ class TemporalDepth {
         writer_(writer),
         progress_(progress) {}
 
-  void Compute() {
+  BackgroundViews Compute() {
     ranges_ = RangesOverTime();
     backgrounds_ = MakeBackgroundViews(set_, writer_, options_.threads, progress_);
     const std::string made_from = ComputeBackground();
@@ -77,6 +77,7 @@ class TemporalDepth {
           "what stands still keeps one depth: {:.1f} % of the pixels were worked on per time step",
           100 * open));
     }
+    return std::move(backgrounds_);
   }
 
  private:
@@ -248,12 +249,14 @@ void PutBack(DtrSet&& still, size_t step, DtrSet& set) {
   set.frames[step] = std::move(still.frames.front());
 }
 
-void ComputeStepDepths(DtrSet& set, const SparseScene& points, const StepDepthOptions& options,
-                       io::SetWriter& writer, Progress& progress) {
+std::optional<BackgroundViews> ComputeStepDepths(DtrSet& set, const SparseScene& points,
+                                                 const StepDepthOptions& options,
+                                                 io::SetWriter& writer, Progress& progress) {
+  std::optional<BackgroundViews> backgrounds;
   if (options.depth.engine == "none") {
     progress.Note("depth left out: `engine` none");
   } else if (options.temporal && set.frames.size() >= kLeastTimeSteps) {
-    TemporalDepth(set, points, options, writer, progress).Compute();
+    backgrounds = TemporalDepth(set, points, options, writer, progress).Compute();
   } else {
     if (options.temporal) {
       progress.Note(fmt::format(
@@ -263,6 +266,7 @@ void ComputeStepDepths(DtrSet& set, const SparseScene& points, const StepDepthOp
     ComputeAlone(set, points, options, writer, progress);
   }
   FinishSteps(points, options, writer, set);
+  return backgrounds;
 }
 
 }  // namespace dtr::pipeline

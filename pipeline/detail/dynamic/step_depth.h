@@ -1,6 +1,7 @@
 // pipeline/detail/dynamic/step_depth.h -- depth of all time steps of a dynamic set.
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include "dtr/types/dtr_set.h"
 #include "dtr/types/sparse_scene.h"
 #include "pipeline/depth_settings.h"
+#include "pipeline/detail/dynamic/background_views.h"
 
 namespace dtr::pipeline {
 
@@ -34,7 +36,9 @@ void PutBack(DtrSet&& still, size_t step, DtrSet& set);
 /// time steps, the same for all. With fewer than three time steps there is nothing to tell what
 /// stands still by: each is computed alone, with a note. Else every time step alone (DepthStage).
 /// Time steps that an interrupted run finished are not computed again.
-void ComputeStepDepths(DtrSet& set, const SparseScene& points, const StepDepthOptions& options,
-                       io::SetWriter& writer, Progress& progress);
+/// Returns the backgrounds where depth was computed over time.
+std::optional<BackgroundViews> ComputeStepDepths(DtrSet& set, const SparseScene& points,
+                                                 const StepDepthOptions& options,
+                                                 io::SetWriter& writer, Progress& progress);
 
 }  // namespace dtr::pipeline

@@ -2,6 +2,7 @@
 // folder, one view in memory at a time. All of it tells of its views and can be stopped between
 // them.
 #pragma once
+#include <functional>
 #include <span>
 
 #include "dtr/base/progress.h"
@@ -22,12 +23,23 @@ void FinishScene(DtrSet& set, std::span<const SparsePoint> points, const io::Set
 void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, int threads, double memory_gb,
                  Progress& progress);
 
+/// Completed depth that is known before, of views of a set by their index.
+struct KnownCompletion {
+  /// In holes of the loaded view (image, mask, measured depth), 0 elsewhere; called from any
+  /// thread.
+  std::function<DepthImage(size_t view, const View& loaded)> depth;
+  /// The near end of the range that the view's completed depth is stored in; what is found nearer
+  /// is put there.
+  std::function<double(size_t view)> near_z;
+};
+
 /// Completes the depth of every source view (stereo/complete): what was not measured gets the
-/// depth of a surface or is far. After FinishScene: pixels of disparity need the baselines. Where `memory_gb` is too little, or nothing
-/// was measured at all, a note says so and depth stays as it is. `sparse`: views are indices into
-/// the set's.
+/// depth of a surface or is far. After FinishScene: pixels of disparity need the baselines. Where
+/// `memory_gb` is too little, or nothing was measured at all, a note says so and depth stays as it
+/// is. `sparse`: views are indices into the set's. What is `known` stays as it is, and the rest is
+/// completed as if it had been measured.
 void CompleteDepth(DtrSet& set, const SparseScene& sparse, io::SetWriter& writer, int threads,
-                   double memory_gb, Progress& progress);
+                   double memory_gb, Progress& progress, const KnownCompletion& known = {});
 
 /// How much of the source views has a measured depth.
 struct DepthCount {

@@ -1,0 +1,34 @@
+// pipeline/detail/dynamic/still_completion.h -- completed depth of what stands still, decided once
+// for all time steps.
+#pragma once
+#include <vector>
+
+#include "dtr/base/progress.h"
+#include "dtr/io/set_io.h"
+#include "dtr/types/sparse_scene.h"
+#include "pipeline/detail/dynamic/background_views.h"
+#include "pipeline/detail/run/finishing.h"
+
+namespace dtr::pipeline {
+
+/// The completed depth of the backgrounds, for settled pixels of every time step. Used while the
+/// writer has their files.
+class StillCompletion {
+ public:
+  /// Completes the backgrounds' depth. `views`: those of a time step; `points`: its views are
+  /// indices into them.
+  StillCompletion(BackgroundViews backgrounds, const SparseScene& points,
+                  const std::vector<View>& views, io::SetWriter& writer, int threads,
+                  double memory_gb, Progress& progress);
+
+  /// What is known of a time step with these views; they and this must outlive it.
+  KnownCompletion Of(const std::vector<View>& views) const;
+
+ private:
+  DepthImage Known(size_t source, const View& loaded) const;
+
+  BackgroundViews backgrounds_;
+  io::SetWriter& writer_;
+};
+
+}  // namespace dtr::pipeline
