@@ -518,6 +518,9 @@ void SetWriter::State::RemoveUnnamed(const DtrSet& set) const {
     }
   }
   for (const fs::path& file : unnamed) fs::remove(file);
+  for (const char* folder : kPixelFolders) {
+    if (IsEmptyFolder(partial / folder)) fs::remove(partial / folder);
+  }
 }
 
 void SetWriter::State::MoveIntoPlace() {
