@@ -144,6 +144,74 @@ TEST_F(BuildDynamic, GoesOnWhereItWasInterruptedToTheSameBytes) {
             std::vector<std::string>());
 }
 
+TEST_F(BuildDynamic, WhatStandsStillIsStoredOnce) {
+  const DtrSet set = io::ReadSet(At("set.dtr"));
+  for (const Frame& frame : set.frames) {
+    for (size_t c = 0; c < frame.views.size(); ++c) {
+      const View &view = frame.views[c], &first = set.frames[0].views[c];
+      if (view.role == ViewRole::kHeldOut) continue;
+      ASSERT_TRUE(view.depth_base && view.sigma_base) << view.id;
+      EXPECT_EQ(view.depth_base, first.depth_base);
+      EXPECT_EQ(view.sigma_base, first.sigma_base);
+    }
+  }
+  const Json info = Json::parse(DtrOk({"info", At("set.dtr"), "--json", "-"}).out);
+  EXPECT_GT(info["parts"]["still_parts"], 0);
+  EXPECT_LT(info["parts"]["depth"], kSteps * info["parts"]["still_parts"].get<double>() / 2);
+}
+
+TEST_F(BuildDynamic, CompletedDepthOfWhatStandsStillIsTheSameAtAllTimeSteps) {
+  std::vector<std::string> words = Build("completed.dtr");
+  std::erase(words, "--no-completion");
+  DtrOk(words);
+  const DtrSet set = io::LoadSet(At("completed.dtr"), {.completed = true});
+  long same = 0, all = 0;
+  for (size_t c = 0; c < set.frames[0].views.size(); ++c) {
+    const View &first = set.frames[0].views[c], &last = set.frames[kSteps - 1].views[c];
+    ASSERT_TRUE(first.completed_file && last.completed_file);
+    EXPECT_EQ(first.completed_steps, last.completed_steps);
+    EXPECT_EQ(first.completed_near_z, last.completed_near_z);
+    for (size_t i = 0; i < first.depth.grid().data().size(); ++i) {
+      EXPECT_FALSE(DepthImage::IsHole(last.depth.grid().data()[i]));
+      if (first.depth_state.data()[i] == DepthState::kMeasured) continue;
+      ++all;
+      same += first.depth.grid().data()[i] == last.depth.grid().data()[i];
+    }
+  }
+  ASSERT_GT(all, 1000);
+  // As of measured depth, above.
+  EXPECT_GT(static_cast<double>(same) / static_cast<double>(all), 0.67);
+}
+
+TEST_F(BuildDynamic, LosslessVideosAreTheImagesThemselves) {
+  if (FindProgram("ffmpeg").empty()) GTEST_SKIP() << "SKIPPED: no program ffmpeg";
+  fs::create_directories(At("video"));
+  const auto words = Build("video/set.dtr", {"--video", "lossless"});
+  const fs::path partial = At("video/set.dtr") + ".partial";
+  const Ran stopped =
+      Dtr(words, {SIGTERM, [&] { return fs::exists(partial / "video/t0000_cam01.mp4"); }});
+  EXPECT_NE(stopped.code, 0);
+  DtrOk(words);
+  const DtrSet images = io::LoadSet(At("set.dtr")), videos = io::LoadSet(At("video/set.dtr"));
+  for (size_t step = 0; step < images.frames.size(); ++step) {
+    for (size_t c = 0; c < images.frames[step].views.size(); ++c) {
+      const View &a = images.frames[step].views[c], &b = videos.frames[step].views[c];
+      EXPECT_EQ(a.image, b.image) << a.id;
+      EXPECT_EQ(a.depth.grid(), b.depth.grid()) << a.id;
+      EXPECT_EQ(b.image_frame, static_cast<int>(step));
+    }
+  }
+  fs::create_directories(At("whole"));
+  DtrOk(Build("whole/set.dtr", {"--video", "lossless", "--threads", "1"}));
+  EXPECT_EQ(DifferingFiles(Contents(At("video/set.dtr")), Contents(At("whole/set.dtr"))),
+            std::vector<std::string>());
+  const auto psnr_of = [&](const std::string& set) {
+    return Json::parse(
+        DtrOk({"evaluate", At(set), "--renderer", "cpu", "--json", "-"}).out)["mean"]["psnr_db"];
+  };
+  EXPECT_EQ(psnr_of("video/set.dtr"), psnr_of("set.dtr"));
+}
+
 TEST_F(BuildDynamic, DoesNotDependOnThreads) {
   fs::create_directories(At("one"));
   DtrOk(Build("one/set.dtr", {"--threads", "1"}));
@@ -204,6 +272,7 @@ TEST_F(BuildDynamic, RejectsWhatDoesNotGoTogether) {
     ExpectRejected(Dtr(Build("none.dtr", more)), code, text);
     EXPECT_FALSE(fs::exists(At("none.dtr.partial")));
   };
+  rejected({"--video", "52"}, kWrongUsage, "--video: expected a rate factor of 1 to 51");
   rejected({"--to", "9"}, kWrongUsage, "expected 0 <= from <= to <=");
   rejected({"--engine", "sgbm"}, kWrongUsage, "needs --engine patchmatch");
   rejected({"--poses", At("toys/rig.json")}, kWrongUsage,
