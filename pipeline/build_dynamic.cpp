@@ -168,6 +168,15 @@ void FinishViews(const SparseScene& points, const BuildOptions& options, double 
     progress.ThrowIfInterrupted();
   }
   io::StoreStillOnce(writer.folder(), set, options.threads, memory_gb, progress);
+  // After it, as a mesh names the files that it is of.
+  progress.Stage("meshes", static_cast<int>(set.frames.size()));
+  for (size_t step = 0; step < set.frames.size(); ++step) {
+    DtrSet still = TakeStep(set, step);
+    WriteMeshes(still, writer, options.threads, quiet);
+    PutBack(std::move(still), step, set);
+    progress.Update(static_cast<int>(step) + 1);
+    progress.ThrowIfInterrupted();
+  }
 }
 
 }  // namespace
