@@ -143,8 +143,8 @@ void LoadPixels(const fs::path& set_folder, View& view, const LoadOptions& optio
   if (options.images && view.image_file) {
     const fs::path file = set_folder / view.image_file->path;
     if (view.image_frame) {
-      view.image = ReadVideoFrame(file, view.image_file->sha256, *view.image_frame,
-                                  view.camera.width_px(), view.camera.height_px());
+      view.image = ReadVideoFrame(file, *view.image_file, *view.image_frame, view.camera.width_px(),
+                                  view.camera.height_px());
     } else {
       const ImageHeader header = ReadImageHeader(file);
       ExpectViewSize(file, view, header.width_px, header.height_px);

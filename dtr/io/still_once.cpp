@@ -4,6 +4,7 @@
 #include <atomic>
 #include <map>
 #include <optional>
+#include <set>
 #include <span>
 #include <sstream>
 #include <string>
@@ -141,6 +142,19 @@ StoredFile Written(const fs::path& set_folder, const std::string& path, const st
   return {path, Sha256(std::as_bytes(std::span(bytes))), bytes.size()};
 }
 
+/// Bytes of files, equal ones counted once, as sets store them once.
+class FileBytes {
+ public:
+  void Add(const StoredFile& file) {
+    if (counted_.insert(file.sha256).second) sum_ += file.bytes;
+  }
+  std::uint64_t sum() const { return sum_; }
+
+ private:
+  std::set<std::string> counted_;
+  std::uint64_t sum_ = 0;
+};
+
 /// Empty where the numbers of a time step do not fit.
 std::optional<Codes> CommonCodesOf(const fs::path& set_folder, const CameraOverTime& camera) {
   CommonCodes common;
@@ -160,16 +174,17 @@ void StoreOnce(const fs::path& set_folder, const CameraOverTime& camera) {
   const StoredFile base =
       Written(set_folder, "still/" + folder + "/" + camera.views.front()->id + ".dtz",
               EncodeBands(*common));
-  std::uint64_t before = 0, after = base.bytes;
+  FileBytes before, after;
+  after.Add(base);
   std::vector<StoredFile> files;
   for (const View* view : camera.views) {
     const auto codes = kind.codes(set_folder, *view);
     files.push_back(Written(set_folder, folder + "/" + view->id + ".dtd",
                             EncodeDifferences(*codes, *common, base.sha256)));
-    before += (view->*kind.file)->bytes;
-    after += files.back().bytes;
+    before.Add(*(view->*kind.file));
+    after.Add(files.back());
   }
-  if (after >= before) return;
+  if (after.sum() >= before.sum()) return;
   for (size_t i = 0; i < files.size(); ++i) {
     View& view = *camera.views[i];
     view.*kind.file = files[i];

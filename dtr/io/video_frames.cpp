@@ -5,9 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstdio>
+#include <list>
+#include <memory>
 #include <mutex>
+#include <utility>
 
 #include "dtr/base/error.h"
+#include "dtr/base/files.h"
 #include "dtr/base/hash.h"
 #include "dtr/io/ffmpeg_handles.h"
 
@@ -29,25 +34,69 @@ std::uint8_t Level(double value) {
       fmt::format("{}: FFmpeg cannot read it as a video: {}", file.string(), FfmpegError(code)));
 }
 
-Ffmpeg<AVFormatContext> OpenMp4(const fs::path& file) {
-  AVDictionary* options = nullptr;
-  av_dict_set(&options, "protocol_whitelist", "file", 0);
-  av_dict_set(&options, "format_whitelist", "mov", 0);
-  AVFormatContext* context = nullptr;
-  // What stands before a colon at the beginning would be a protocol.
-  const std::string url = "file:" + fs::absolute(file).string();
-  const int code =
-      avformat_open_input(&context, url.c_str(), av_find_input_format("mov"), &options);
-  av_dict_free(&options);
-  if (code < 0) FailVideo(file, code);
+/// A file's content for FFmpeg to read from: what was hashed is what is decoded, and nothing is
+/// opened that the content names.
+class MemoryInput {
+ public:
+  explicit MemoryInput(std::string bytes) : bytes_(std::move(bytes)) {
+    constexpr int kBufferBytes = 1 << 15;
+    context_ = avio_alloc_context(static_cast<unsigned char*>(av_malloc(kBufferBytes)),
+                                  kBufferBytes, 0, this, &Read, nullptr, &Seek);
+  }
+  ~MemoryInput() {
+    av_freep(&context_->buffer);
+    avio_context_free(&context_);
+  }
+  MemoryInput(const MemoryInput&) = delete;
+  MemoryInput& operator=(const MemoryInput&) = delete;
+  AVIOContext* context() const { return context_; }
+  size_t size() const { return bytes_.size(); }
+
+ private:
+  static int Read(void* opaque, std::uint8_t* to, int most) {
+    auto& input = *static_cast<MemoryInput*>(opaque);
+    const size_t count = std::min(static_cast<size_t>(most), input.bytes_.size() - input.at_);
+    if (count == 0) return AVERROR_EOF;
+    std::copy_n(input.bytes_.data() + input.at_, count, to);
+    input.at_ += count;
+    return static_cast<int>(count);
+  }
+  static std::int64_t Seek(void* opaque, std::int64_t offset, int whence) {
+    auto& input = *static_cast<MemoryInput*>(opaque);
+    const auto size = static_cast<std::int64_t>(input.bytes_.size());
+    if ((whence & AVSEEK_SIZE) != 0) return size;
+    const std::int64_t from = (whence & 3) == SEEK_CUR   ? static_cast<std::int64_t>(input.at_)
+                              : (whence & 3) == SEEK_END ? size
+                                                         : 0;
+    if (offset < -from || offset > size - from) return AVERROR(EINVAL);
+    input.at_ = static_cast<size_t>(from + offset);
+    return from + offset;
+  }
+
+  std::string bytes_;
+  size_t at_ = 0;
+  AVIOContext* context_ = nullptr;
+};
+
+Ffmpeg<AVFormatContext> OpenMp4(const fs::path& file, const MemoryInput& input) {
+  AVFormatContext* context = avformat_alloc_context();
+  context->pb = input.context();
+  const int code = avformat_open_input(&context, "", av_find_input_format("mov"), nullptr);
+  if (code < 0) FailVideo(file, code);  // the context is freed
   return Ffmpeg<AVFormatContext>(context);
 }
 
-/// Decodes the one track of a video of a set.
+/// Decodes the one track of a video of a set, from its first frame on.
 class FrameDecoder {
  public:
-  FrameDecoder(const fs::path& file, int width_px, int height_px)
-      : file_(file), format_(OpenMp4(file)), packet_(av_packet_alloc()), frame_(av_frame_alloc()) {
+  FrameDecoder(const fs::path& file, std::string bytes, std::string sha256, int width_px,
+               int height_px)
+      : sha256_(std::move(sha256)),
+        pixels_(static_cast<std::uint64_t>(width_px) * static_cast<std::uint64_t>(height_px)),
+        input_(std::move(bytes)),
+        format_(OpenMp4(file, input_)),
+        packet_(av_packet_alloc()),
+        frame_(av_frame_alloc()) {
     const AVCodec* decoder = avcodec_find_decoder(AV_CODEC_ID_H264);
     const bool is_h264 =
         format_->nb_streams == 1 && format_->streams[0]->codecpar->codec_id == AV_CODEC_ID_H264;
@@ -67,31 +116,93 @@ class FrameDecoder {
     if (code < 0) FailVideo(file, code);
   }
 
-  /// The next frame in the order they are shown; nullptr after the last.
-  const AVFrame* Next() {
-    while (true) {
-      const int code = avcodec_receive_frame(codec_.get(), frame_.get());
-      if (code == AVERROR_EOF) return nullptr;
-      if (code >= 0) return frame_.get();
-      if (code != AVERROR(EAGAIN)) FailVideo(file_, code);
-      Send();
+  const std::string& sha256() const { return sha256_; }
+  int number() const { return number_; }  ///< of the frame it is at; -1 before the first
+  /// What it takes, with the frames that others refer to.
+  std::uint64_t bytes() const {
+    constexpr std::uint64_t kFramesHeld = 10;
+    return input_.size() + 3 * kFramesHeld * pixels_;
+  }
+
+  /// Frame `number`, which it is at or comes to, in the order they are shown.
+  const AVFrame& Frame(int number, const fs::path& file) {
+    while (number_ < number) {
+      if (!Next(file)) {
+        throw Error(fmt::format("{}: expected a frame {}, found {} frames", file.string(), number,
+                                number_ + 1));
+      }
+      ++number_;
     }
+    return *frame_;
   }
 
  private:
-  void Send() {
+  bool Next(const fs::path& file) {
+    while (true) {
+      const int code = avcodec_receive_frame(codec_.get(), frame_.get());
+      if (code == AVERROR_EOF) return false;
+      if (code >= 0) return true;
+      if (code != AVERROR(EAGAIN)) FailVideo(file, code);
+      Send(file);
+    }
+  }
+  void Send(const fs::path& file) {
     av_packet_unref(packet_.get());
     const bool more = av_read_frame(format_.get(), packet_.get()) >= 0;
     const int code = avcodec_send_packet(codec_.get(), more ? packet_.get() : nullptr);
-    if (code < 0) FailVideo(file_, code);
+    if (code < 0) FailVideo(file, code);
   }
 
-  const fs::path& file_;
+  std::string sha256_;
+  std::uint64_t pixels_;
+  MemoryInput input_;
   Ffmpeg<AVFormatContext> format_;
   Ffmpeg<AVCodecContext> codec_;
   Ffmpeg<AVPacket> packet_;
   Ffmpeg<AVFrame> frame_;
+  int number_ = -1;
 };
+
+/// Decoders of videos that were read from lately: time steps are mostly read one after the other,
+/// and the next one then takes one frame more. They are found by content, so that what is read does
+/// not depend on what was read before.
+class IdleDecoders {
+ public:
+  /// One that is at the frame or before it, the nearest; none where there is none.
+  std::unique_ptr<FrameDecoder> Take(const std::string& sha256, int number) {
+    const std::lock_guard lock(mutex_);
+    auto best = idle_.end();
+    for (auto at = idle_.begin(); at != idle_.end(); ++at) {
+      if ((*at)->sha256() != sha256 || (*at)->number() > number) continue;
+      if (best == idle_.end() || (*at)->number() > (*best)->number()) best = at;
+    }
+    if (best == idle_.end()) return nullptr;
+    std::unique_ptr<FrameDecoder> taken = std::move(*best);
+    idle_.erase(best);
+    bytes_ -= taken->bytes();
+    return taken;
+  }
+  void GiveBack(std::unique_ptr<FrameDecoder> decoder) {
+    const std::lock_guard lock(mutex_);
+    bytes_ += decoder->bytes();
+    idle_.push_back(std::move(decoder));
+    while (bytes_ > kMostBytes) {
+      bytes_ -= idle_.front()->bytes();
+      idle_.pop_front();
+    }
+  }
+
+ private:
+  static constexpr std::uint64_t kMostBytes = 256'000'000;
+  std::mutex mutex_;
+  std::list<std::unique_ptr<FrameDecoder>> idle_;  // the one given back last at the end
+  std::uint64_t bytes_ = 0;
+};
+
+IdleDecoders& Idle() {
+  static IdleDecoders idle;
+  return idle;
+}
 
 ImageRgb8 FromGbr(const AVFrame& frame, int width_px, int height_px) {
   constexpr std::array<size_t, 3> kPlaneOf{2, 0, 1};  // of R, G and B
@@ -131,25 +242,24 @@ void QuietFfmpeg() {
   std::call_once(once, [] { av_log_set_level(AV_LOG_QUIET); });
 }
 
-ImageRgb8 ReadVideoFrame(const fs::path& file, const std::string& sha256, int number, int width_px,
+ImageRgb8 ReadVideoFrame(const fs::path& file, const StoredFile& stored, int number, int width_px,
                          int height_px) {
   QuietFfmpeg();
+  std::string bytes = ReadFile(file, stored.bytes);
   // H.264 has no checksum: damage would decode to something.
-  if (Sha256OfFile(file) != sha256) {
+  if (Sha256(std::as_bytes(std::span(bytes))) != stored.sha256) {
     throw Error(file.string() +
                 ": expected the content that the set records, found another; dtr info with "
                 "`verify` names every such file");
   }
-  FrameDecoder decoder(file, width_px, height_px);
-  const AVFrame* frame = nullptr;
-  for (int i = 0; i <= number; ++i) {
-    frame = decoder.Next();
-    if (frame == nullptr) {
-      throw Error(
-          fmt::format("{}: expected a frame {}, found {} frames", file.string(), number, i));
-    }
+  std::unique_ptr<FrameDecoder> decoder = Idle().Take(stored.sha256, number);
+  if (!decoder) {
+    decoder =
+        std::make_unique<FrameDecoder>(file, std::move(bytes), stored.sha256, width_px, height_px);
   }
-  return Pixels(*frame, file, width_px, height_px);
+  ImageRgb8 image = Pixels(decoder->Frame(number, file), file, width_px, height_px);
+  Idle().GiveBack(std::move(decoder));
+  return image;
 }
 
 std::vector<std::uint8_t> YCbCrFromRgb(const ImageRgb8& image) {
@@ -174,11 +284,11 @@ ImageRgb8 RgbFromYCbCr(std::span<const std::uint8_t* const, 3> planes,
     const std::uint8_t* red = planes[2] + std::ptrdiff_t{y} * row_bytes[2];
     std::uint8_t* rgb = image.row(y);
     for (int x = 0; x < width_px; ++x, rgb += 3) {
-      const double b = luma[x] + 2 * (1 - kBlue) * (blue[x] - kMiddle);
-      const double r = luma[x] + 2 * (1 - kRed) * (red[x] - kMiddle);
-      rgb[0] = Level(r);
-      rgb[1] = Level((luma[x] - kRed * r - kBlue * b) / kGreen);
-      rgb[2] = Level(b);
+      const double b = 2 * (1 - kBlue) * (blue[x] - kMiddle);
+      const double r = 2 * (1 - kRed) * (red[x] - kMiddle);
+      rgb[0] = Level(luma[x] + r);
+      rgb[1] = Level(luma[x] - kRed / kGreen * r - kBlue / kGreen * b);
+      rgb[2] = Level(luma[x] + b);
     }
   }
   return image;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dtr/types/grid.h"
+#include "dtr/types/view.h"
 
 namespace dtr::io {
 
@@ -15,9 +16,11 @@ namespace dtr::io {
 inline constexpr int kMaxVideoFrames = 256;
 
 /// Frame `number`, from 0, of a video of a set, decoded by FFmpeg's libraries: the same pixels
-/// wherever it is read. `sha256`: of the file. Throws Error where the file has another content, is
-/// no H.264 video of the kind that sets have, has frames of another size or too few of them.
-ImageRgb8 ReadVideoFrame(const std::filesystem::path& file, const std::string& sha256, int number,
+/// wherever it is read. `stored`: hash and size that the set records. Frames that are read one
+/// after the other are decoded once each: decoders of late stay, within 256 MB. From any thread.
+/// Throws Error where the file has another content, is no H.264 video of the kind that sets have,
+/// has frames of another size or too few of them.
+ImageRgb8 ReadVideoFrame(const std::filesystem::path& file, const StoredFile& stored, int number,
                          int width_px, int height_px);
 
 /// 8-bit Y'CbCr of BT.709, full range, as three planes one after the other: what videos that are

@@ -46,9 +46,12 @@ View WallView(int camera, int step) {
       view.depth(x, y) = static_cast<float>(wall.Uniform(4, 5));
       (*view.inverse_depth_sigma)(x, y) = static_cast<float>(wall.Uniform(0.001, 0.01));
       if (x < 6) view.depth(x, y) = (*view.inverse_depth_sigma)(x, y) = 0;
-      if (x < 3) completed(x, y) = y < 20 ? static_cast<float>(kFarZ) : 6;
-      const bool before = x >= 8 + 4 * step && x < 18 + 4 * step && y >= 10 && y < 20;
-      if (before) view.depth(x, y) = static_cast<float>(square.Uniform(2, 3));
+      const bool changes = y >= 10 + 4 * step && y < 20 + 4 * step;
+      if (x < 5) completed(x, y) = static_cast<float>(y < 15 ? kFarZ : wall.Uniform(5, 8));
+      if (x < 5 && changes) completed(x, y) = static_cast<float>(square.Uniform(5, 8));
+      if (x < 20 || x >= 30 || !changes) continue;
+      view.depth(x, y) = static_cast<float>(square.Uniform(2, 3));
+      (*view.inverse_depth_sigma)(x, y) = static_cast<float>(square.Uniform(0.001, 0.01));
     }
   }
   AddCompletedDepth(completed, view);
@@ -108,8 +111,11 @@ TEST_F(StillOnce, EveryNumberIsTheSameInAFractionOfTheBytes) {
       EXPECT_EQ(b.depth_base, after.frames[0].views[v].depth_base) << "one for all time steps";
     }
   }
-  for (const char* kind : {"depth", "completed", "sigma"}) {
-    EXPECT_LT(BytesIn(once_ / kind) + BytesIn(once_ / "still" / kind), BytesIn(plain_ / kind) / 2)
+  // Of completed depth there is so little that what every file has (sizes, hashes) counts.
+  for (const auto& [kind, share] :
+       {std::pair("depth", 0.5), std::pair("completed", 0.7), std::pair("sigma", 0.5)}) {
+    EXPECT_LT(BytesIn(once_ / kind) + BytesIn(once_ / "still" / kind),
+              share * static_cast<double>(BytesIn(plain_ / kind)))
         << kind;
   }
   EXPECT_THAT(VerifySet(once_), IsEmpty());
@@ -131,6 +137,8 @@ TEST_F(StillOnce, BytesAreTheSameForAnyNumberOfThreads) {
 TEST_F(StillOnce, WhatMovesEverywhereStaysAsItIs) {
   Random random(1);
   const DtrSet set = WriteMovingSet(once_, true, 1, [&](View& view) {
+    view.depth_coding = DepthCoding::kZstdInverseDepth;
+    view.depth_steps = 60000;
     for (float& z : view.depth.grid().data()) {
       if (z > 0 && z < 9) z = static_cast<float>(random.Uniform(2, 8));
     }
@@ -138,6 +146,14 @@ TEST_F(StillOnce, WhatMovesEverywhereStaysAsItIs) {
   EXPECT_FALSE(set.frames[0].views[0].depth_base);
   EXPECT_TRUE(set.frames[0].views[0].sigma_base);
   EXPECT_THAT(VerifySet(once_), IsEmpty());
+}
+
+TEST_F(StillOnce, FilesThatAreEqualAnywayStayAsTheyAre) {
+  const DtrSet set = WriteMovingSet(once_, true, 1, [&](View& view) {
+    view.depth = WallView(view.name == "cam0" ? 0 : 1, 0).depth;
+  });
+  EXPECT_FALSE(set.frames[3].views[0].depth_base);
+  EXPECT_EQ(set.frames[3].views[0].depth_file, set.frames[0].views[0].depth_file);
 }
 
 TEST_F(StillOnce, CodingsThatDifferOrAreNoCodesStayAsTheyAre) {
