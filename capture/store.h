@@ -26,7 +26,7 @@ struct StoreOptions {
   double memory_gb = 0;  ///< of photos in memory at a time, as for IngestPhotos; 0: no bound
 };
 
-/// Writes a capture: `folder`/images/<id>.<extension>, masks/<id>.png where there are masks and,
+/// Writes a capture: `folder`/images/ID.EXTENSION, masks/ID.png where there are masks and,
 /// last, capture.json. A photo that is upright already keeps its bytes; a turned or raw one becomes
 /// a PNG with exactly its pixels. The folder appears whole or not at all: work goes on in
 /// `folder`.partial, which one process at a time has and which is gone at the end unless the

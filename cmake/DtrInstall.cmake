@@ -23,18 +23,19 @@ add_custom_command(OUTPUT ${PROJECT_BINARY_DIR}/dtr.1.gz
   DEPENDS ${PROJECT_BINARY_DIR}/dtr.manual VERBATIM)
 install(FILES ${PROJECT_BINARY_DIR}/dtr.1.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT runtime)
 
-# Headers that call themselves internal in their first lines are nobody's outside.
-file(GLOB_RECURSE headers RELATIVE ${PROJECT_SOURCE_DIR} dtr/*.h capture/*.h calib/*.h stereo/*.h datasets/*.h viewer/*.h)
-set(internal_headers)
+# DTR_PUBLIC_HEADERS, relative to the root: those of the libraries that do not call themselves internal in their first lines.
+file(GLOB_RECURSE headers RELATIVE ${PROJECT_SOURCE_DIR}
+  dtr/*.h capture/*.h calib/*.h stereo/*.h datasets/*.h viewer/*.h pipeline/*.h)
+list(FILTER headers EXCLUDE REGEX "/(shaders|detail|examples|plaza)/")
+set(DTR_PUBLIC_HEADERS)
 foreach(header ${headers})
   file(STRINGS ${PROJECT_SOURCE_DIR}/${header} lines LIMIT_COUNT 2)
-  if(lines MATCHES "[Ii]nternal")
-    list(APPEND internal_headers REGEX "${header}$" EXCLUDE)
+  if(NOT lines MATCHES "[Ii]nternal")
+    list(APPEND DTR_PUBLIC_HEADERS ${header})
+    get_filename_component(folder ${header} DIRECTORY)
+    install(FILES ${header} DESTINATION ${DTR_INSTALL_HEADERS}/${folder} COMPONENT dev)
   endif()
 endforeach()
-install(DIRECTORY dtr capture calib stereo datasets viewer pipeline DESTINATION ${DTR_INSTALL_HEADERS} COMPONENT dev
-  FILES_MATCHING PATTERN "*.h" PATTERN shaders EXCLUDE PATTERN detail EXCLUDE PATTERN examples EXCLUDE PATTERN plaza EXCLUDE
-  ${internal_headers})
 set(config ${CMAKE_INSTALL_LIBDIR}/cmake/dtr)
 configure_package_config_file(cmake/dtrConfig.cmake.in ${PROJECT_BINARY_DIR}/dtrConfig.cmake
   INSTALL_DESTINATION ${config})
