@@ -29,8 +29,8 @@ struct DepthPrior {
 /// Planes of a depth map on its own grid: inverse depths of a low resolution and with noise become
 /// a surface that can be continued to finer pixels. At each pixel a plane is fitted by least
 /// squares to those of its 5x5 neighbourhood that belong to the same surface: whose inverse depths
-/// differ from its own, continued by its slope, by less than what the noise of the map explains. That noise is estimated from second
-/// differences along rows (Immerkaer, CVIU 64, 1996, in one dimension and with a median).
+/// differ from its own, continued by its slope, by less than the map's noise explains, which second
+/// differences along rows estimate (Immerkaer, CVIU 64, 1996, in one dimension, with a median).
 class PriorPlanes {
  public:
   /// `depth`: plane z. Throws std::invalid_argument for ray distances.

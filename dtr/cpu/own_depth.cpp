@@ -104,8 +104,7 @@ class OwnFragmentFinder {
   }
 
   /// 1 / (tan^2 t + t_pixel^2), t the angle of SPEC 4.5 at the point ray / w; 0 from 90 degrees on.
-  double VoteWeight(const Eigen::Vector3d& ray, double w,
-                    const BlendParameters& blend) const {
+  double VoteWeight(const Eigen::Vector3d& ray, double w, const BlendParameters& blend) const {
     w = std::max(w, blend.least_inverse_depth);
     const Eigen::Vector3d to_view = center_ * w - ray;
     const double dot = to_view.dot(-ray);

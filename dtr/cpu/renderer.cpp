@@ -84,7 +84,8 @@ RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
   for (int first_row = 0; first_row < novel.height_px(); first_row += rows_per_band) {
     const Band band{novel.width_px(), first_row,
                     std::min(rows_per_band, novel.height_px() - first_row)};
-    const std::vector<Layer> layers = DrawLayers(setup.placed, meshes, novel, options, setup.settings.blend, band);
+    const std::vector<Layer> layers =
+        DrawLayers(setup.placed, meshes, novel, options, setup.settings.blend, band);
     for (size_t i = 0; i < views.size(); ++i) views[i].layer = &layers[i];
     ParallelFor(band.first_row, band.first_row + band.rows, options.threads,
                 [&](int y) { ResolveRow(setup.settings, views, y, result); });

@@ -61,7 +61,8 @@ void Measure(const Place& place, const std::vector<RenderOptions>& variants, int
              TimedRenderer& renderer, std::vector<RowSums>& sums) {
   const Pose& pose = place.photo->cam_from_world;
   const size_t count = variants.size();
-  const auto finish = [&](const PinholeCamera& camera, RenderOptions options, RenderResult& result) {
+  const auto finish = [&](const PinholeCamera& camera, RenderOptions options,
+                          RenderResult& result) {
     options.fill_holes = options.smooth_edges = true;
     FinishImage(place.scene, camera, pose, options, result);
   };

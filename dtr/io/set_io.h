@@ -188,8 +188,8 @@ void WriteRunRecord(const std::filesystem::path& set_folder, const RunRecord& re
 
 /// For people: a summary and one line per view.
 std::string DescribeSet(const DtrSet& set);
-/// For machines, the output of `dtr info --json`: unit, validation, and of each view over all frames
-/// id, name, role, width_px, height_px and what else it has; pretty-printed.
+/// For machines, the output of `dtr info --json`: unit, validation, and of each view over all
+/// frames id, name, role, width_px, height_px and what else it has; pretty-printed.
 std::string InfoJson(const DtrSet& set);
 
 }  // namespace dtr::io

@@ -46,8 +46,12 @@ void DivideBySum(std::span<double> shares) {
 BlendParameters BlendParametersOf(const RenderOptions& options, double novel_fx_px,
                                   const Bounds& bounds) {
   const double diagonal = bounds.empty() ? 0 : (bounds.max - bounds.min).norm();
-  return {options.blend,   options.exponent,      options.falloff,
-          options.blend_k, options.max_angle_rad, std::atan2(1.0, novel_fx_px),
+  return {options.blend,
+          options.exponent,
+          options.falloff,
+          options.blend_k,
+          options.max_angle_rad,
+          std::atan2(1.0, novel_fx_px),
           diagonal > 0 ? 1 / diagonal : 0};
 }
 

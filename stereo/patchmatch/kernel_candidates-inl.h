@@ -1,6 +1,6 @@
 // stereo/patchmatch/kernel_candidates-inl.h -- planes that a pixel may take over: its own, those of
-// the cheapest pixels around it (Xu and Tao 2019, sec. 3.1) and what else suggests one. Compiled per
-// instruction set: include only from kernel.cpp.
+// the cheapest pixels around it (Xu and Tao 2019, sec. 3.1) and what else suggests one. Compiled
+// per instruction set: include only from kernel.cpp.
 #if defined(DTR_STEREO_PATCHMATCH_KERNEL_CANDIDATES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef DTR_STEREO_PATCHMATCH_KERNEL_CANDIDATES_INL_H_
 #undef DTR_STEREO_PATCHMATCH_KERNEL_CANDIDATES_INL_H_

@@ -57,8 +57,8 @@ void AddChanges(const Frame& before, const Frame& now, Changes& changes) {
       const double z = now.image.depth(x, y);
       const Eigen::Vector3d p = before_from_now * (z * camera.RayFromPixel({x + 0.5, y + 0.5}));
       const auto pixel = camera.PixelFromCam(p);
-      if (!pixel || pixel->x() < 0.5 || pixel->y() < 0.5 ||
-          pixel->x() >= camera.width_px() - 0.5 || pixel->y() >= camera.height_px() - 0.5) {
+      if (!pixel || pixel->x() < 0.5 || pixel->y() < 0.5 || pixel->x() >= camera.width_px() - 0.5 ||
+          pixel->y() >= camera.height_px() - 0.5) {
         continue;
       }
       const int u = static_cast<int>(pixel->x()), v = static_cast<int>(pixel->y());

@@ -1,6 +1,6 @@
 // frame_report: what does a whole frame cost, and did a change of the code change one byte of it?
-// CPU time of frames of a set's fly-through by the renderer without a GPU, holes filled and edges smooth, on one
-// thread, and a hash of all results; two builds of it compare two commits.
+// CPU time of frames of a set's fly-through by the renderer without a GPU, holes filled and edges
+// smooth, on one thread, and a hash of all results; two builds of it compare two commits.
 //
 //   frame_report SET.dtr [frames=12] [repeats=5]
 #include <algorithm>

@@ -1,6 +1,6 @@
 // own_place_report: does an input camera's own place show its photo? PSNR of the rendered image,
-// holes filled and edges smoothed, against each source photo, drawn from all views; docs/accuracy/RENDERING.md has
-// the figures.
+// holes filled and edges smoothed, against each source photo, drawn from all views;
+// docs/accuracy/RENDERING.md has the figures.
 //
 //   own_place_report SET.dtr
 #include <algorithm>

@@ -109,8 +109,8 @@ TEST(KeepSupportedSurfaces, PutsASurfaceWhereTheViewsPatchHasIt) {
     std::vector<double> surfaces(static_cast<size_t>(band.width_px * band.rows), 0.0);
     surfaces[pixel] = truth + wrong_px * kPixelOfDisparity;
     const std::vector<ViewInNovel> views(copies, pair.in_novel);
-    KeepSupportedSurfaces(views, pair.novel, {}, BlendParametersOf({}, pair.novel.fx_px(), {}), band,
-                          surfaces);
+    KeepSupportedSurfaces(views, pair.novel, {}, BlendParametersOf({}, pair.novel.fx_px(), {}),
+                          band, surfaces);
     return surfaces[pixel];
   };
   for (const double wrong_px : {-0.45, 0.0, 0.45, 1.9}) {

@@ -44,8 +44,8 @@ TEST_F(Plugin, OptionsWithoutAMeaningAreToldBeforeAnythingIsRead) {
                                         HasSubstr(": expected a whole number, found ")))
         << option;
   }
-  for (const char* option : {"blend=best", "keys=perhaps", "method=one-pass", "fill-holes=no",
-                             "smooth-edges=1"}) {
+  for (const char* option :
+       {"blend=best", "keys=perhaps", "method=one-pass", "fill-holes=no", "smooth-edges=1"}) {
     const auto result = Load(set, option);
     EXPECT_FALSE(result.success()) << option;
     EXPECT_THAT(result.message(),

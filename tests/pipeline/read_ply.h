@@ -1,4 +1,5 @@
-// tests/pipeline/read_ply.h -- vertices of a binary PLY file (triangles may follow), read from its header alone.
+// tests/pipeline/read_ply.h -- vertices of a binary PLY file (triangles may follow), read from its
+// header alone.
 #pragma once
 #include <cstdint>
 #include <cstring>
@@ -59,7 +60,8 @@ inline Ply ReadPly(const std::filesystem::path& file) {
     }
   }
   constexpr size_t kTriangleBytes = 13;
-  if (at + kTriangleBytes * triangles != bytes.size()) throw std::runtime_error("PLY: not as long as its header says");
+  if (at + kTriangleBytes * triangles != bytes.size())
+    throw std::runtime_error("PLY: not as long as its header says");
   return ply;
 }
 

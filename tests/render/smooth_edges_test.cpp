@@ -57,7 +57,7 @@ Painted Noise() {
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
       painted.Set(x, y, static_cast<std::uint8_t>(random.Index(256)),
-                static_cast<float>(random.Uniform(1, 9)));
+                  static_cast<float>(random.Uniform(1, 9)));
     }
   }
   return painted;

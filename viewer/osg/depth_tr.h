@@ -54,8 +54,8 @@ class DepthTR : public osg::Geode {
       void load(const std::string& set_folder);
   /// A set in memory, whose source views have image and depth.
   void setScene(dtr::DtrSet set);
-  /// What the set was pruned for, else whole frames as `dtr render` draws them; loading does not set
-  /// them.
+  /// What the set was pruned for, else whole frames as `dtr render` draws them; loading does not
+  /// set them.
   dtr::RenderOptions getDefaultRenderOptions() const;
   bool isLoaded() const { return getScene() != nullptr; }
   /// The time step that is shown; null without a set.

@@ -38,7 +38,7 @@ struct SfmRun {
 /// RefinePhotos of what RunSfm made. Where its focal length contradicts EXIF, the matches are
 /// mapped again with EXIF's, and that model is taken unless held-out observations of the first are
 /// predicted clearly better; where the observations do not determine a focal length either, EXIF's
-/// is held. `sfm` becomes what was taken; the report gets `exif_focal`, and one line has both values.
+/// is held. `sfm` becomes what was taken; the report gets `exif_focal`; one line has both values.
 PhotoRefinement RefineSfm(const SfmRun& run, colmap::SfmResult& sfm, Progress& progress);
 
 }  // namespace dtr::pipeline

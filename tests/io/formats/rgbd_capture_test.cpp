@@ -122,8 +122,8 @@ std::string ErrorOf(const fs::path& capture, const std::string& format) {
   return "no error";
 }
 
-/// Cuts a file of a capture after every fifth byte but those of its last word; each cut must be an Error,
-/// or leave fewer cameras.
+/// Cuts a file of a capture after every fifth byte but those of its last word; each cut must be an
+/// Error, or leave fewer cameras.
 void ExpectCutsNoticed(const fs::path& capture, const fs::path& file, const std::string& format) {
   std::ifstream in(file, std::ios::binary);
   const std::string whole((std::istreambuf_iterator<char>(in)), {});
