@@ -72,14 +72,18 @@ Similarity AlignPoints(std::span<const Eigen::Vector3d> points_in_a,
 
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(b * a.transpose(),
                                               Eigen::ComputeFullU | Eigen::ComputeFullV);
-  // Of the turns U S V^T take the one that is no reflection; for flat sets both fit equally well.
-  Eigen::Vector3d signs = Eigen::Vector3d::Ones();
-  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) signs(2) = -1;
   Similarity b_from_a;
-  b_from_a.rotation = Eigen::Quaterniond(Eigen::Matrix3d(svd.matrixU() * signs.asDiagonal() *
-                                                         svd.matrixV().transpose()))
-                          .normalized();
-  b_from_a.scale = svd.singularValues().dot(signs) / a.squaredNorm();
+  b_from_a.scale = 0;
+  // Products of finite coordinates may be infinite: then the decomposition has no values.
+  if (svd.info() == Eigen::Success) {
+    // Of the turns U S V^T take the one that is no reflection; for flat sets both fit equally well.
+    Eigen::Vector3d signs = Eigen::Vector3d::Ones();
+    if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) signs(2) = -1;
+    b_from_a.rotation = Eigen::Quaterniond(Eigen::Matrix3d(svd.matrixU() * signs.asDiagonal() *
+                                                           svd.matrixV().transpose()))
+                            .normalized();
+    b_from_a.scale = svd.singularValues().dot(signs) / a.squaredNorm();
+  }
   if (!(b_from_a.scale > 0) || !std::isfinite(b_from_a.scale)) {
     throw Error("alignment: the two sets of points have nothing in common (no positive scale)");
   }

@@ -5,11 +5,11 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
-#include <opencv2/aruco/charuco.hpp>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "calib/boards/corner_noise.h"
+#include "calib/boards/opencv_aruco.h"
 #include "calib/boards/opencv_images.h"
 #include "calib/boards/opencv_pixels.h"
 
@@ -49,13 +49,11 @@ Found FindChessboard(const cv::Mat& image, const Board& board, ChessboardDetecto
 
 Found FindCharuco(const cv::Mat& given, const Board& board) {
   const cv::Mat image = board.inverted ? Inverted(given) : given;
-  const auto dictionary = cv::aruco::getPredefinedDictionary(DictionaryNumber(board.dictionary));
-  const auto charuco = cv::aruco::CharucoBoard::create(
-      board.columns + 1, board.rows + 1, 1.0f, static_cast<float>(board.marker_share), dictionary);
-  std::vector<std::vector<cv::Point2f>> markers, rejected;
+  const auto dictionary = MarkersOf(board.dictionary);
+  const auto charuco = CharucoOf(board, dictionary);
+  std::vector<std::vector<cv::Point2f>> markers;
   std::vector<int> marker_ids;
-  cv::aruco::detectMarkers(image, dictionary, markers, marker_ids,
-                           cv::aruco::DetectorParameters::create(), rejected);
+  cv::aruco::detectMarkers(image, dictionary, markers, marker_ids);
   if (marker_ids.empty()) return {};
   std::vector<cv::Point2f> corners;
   std::vector<int> ids;

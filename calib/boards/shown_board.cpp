@@ -5,13 +5,13 @@
 #include <cmath>
 #include <deque>
 #include <map>
-#include <opencv2/aruco.hpp>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 #include <vector>
 
 #include "calib/boards/board.h"
+#include "calib/boards/opencv_aruco.h"
 #include "calib/boards/opencv_images.h"
 #include "calib/boards/opencv_pixels.h"
 #include "dtr/base/order_statistics.h"
@@ -195,9 +195,7 @@ SeenMarkers Detected(const cv::Mat& image, const std::string& dictionary) {
   std::vector<std::vector<cv::Point2f>> outlines;
   SeenMarkers seen;
   try {
-    cv::aruco::detectMarkers(image,
-                             cv::aruco::getPredefinedDictionary(DictionaryNumber(dictionary)),
-                             outlines, seen.ids);
+    cv::aruco::detectMarkers(image, MarkersOf(dictionary), outlines, seen.ids);
   } catch (const cv::Exception&) {
     return {};
   }

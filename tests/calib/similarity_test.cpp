@@ -167,6 +167,9 @@ TEST(AlignPoints, RejectsWhatCannotBeAligned) {
   Points far_line = line;
   for (auto& p : far_line) p = p * 0.1 + Eigen::Vector3d(1e7, 1e7, 1e7);
   EXPECT_THROW(AlignPoints(far_line, corner), Error);
+  Points huge = corner;  // finite, but their products are not
+  for (auto& p : huge) p *= 1e200;
+  EXPECT_THROW(AlignPoints(huge, huge), Error);
 }
 
 }  // namespace

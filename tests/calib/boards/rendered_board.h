@@ -4,9 +4,9 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <opencv2/aruco/charuco.hpp>
 
 #include "calib/boards/board.h"
+#include "calib/boards/opencv_aruco.h"
 #include "dtr/base/random.h"
 #include "dtr/types/camera.h"
 #include "dtr/types/grid.h"
@@ -19,11 +19,8 @@ class BoardPrint {
  public:
   explicit BoardPrint(const Board& board) : board_(board) {
     if (board.kind == Board::Kind::kChessboard) return;
-    const auto dictionary = cv::aruco::getPredefinedDictionary(DictionaryNumber(board.dictionary));
-    const auto charuco =
-        cv::aruco::CharucoBoard::create(board.columns + 1, board.rows + 1, 1.0f,
-                                        static_cast<float>(board.marker_share), dictionary);
-    charuco->draw({kTexels * (board.columns + 1), kTexels * (board.rows + 1)}, print_, 0, 1);
+    print_ = PrintOf(CharucoOf(board, MarkersOf(board.dictionary)),
+                     {kTexels * (board.columns + 1), kTexels * (board.rows + 1)});
   }
 
   double Brightness(const Eigen::Vector2d& place) const {
