@@ -16,7 +16,7 @@ install(FILES ${PROJECT_BINARY_DIR}/dtr.completion RENAME dtr
 install(FILES LICENSE RENAME copyright DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime)
 install(FILES README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime)
 install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime FILES_MATCHING PATTERN "*.md"
-  PATTERN images EXCLUDE)
+  PATTERN images EXCLUDE PATTERN site EXCLUDE)
 # Compressed as Debian asks; -n leaves the time out, so that equal pages are equal files.
 add_custom_command(OUTPUT ${PROJECT_BINARY_DIR}/dtr.1.gz
   COMMAND gzip -9nc ${PROJECT_BINARY_DIR}/dtr.manual > ${PROJECT_BINARY_DIR}/dtr.1.gz

@@ -1,7 +1,7 @@
 # Target `docs`: all pages and the public headers as one site, PROJECT_BINARY_DIR/site/html/index.html; docs/site/ has what
 # makes it. Needs Doxygen, and KaTeX (libjs-katex) for formulas that are drawn. Expects DTR_PUBLIC_HEADERS.
 
-# In the order of the site.
+# In the order of the site; pages of docs/ that are not listed come last.
 set(DTR_SITE_PAGES README.md
   docs/TUTORIAL.md docs/CAPTURE.md docs/IMPORT.md docs/DYNAMIC.md docs/VIEWER.md docs/EXPORT.md docs/PRUNING.md
   docs/PYTHON.md docs/PACKAGES.md docs/OSG.md
@@ -12,9 +12,7 @@ set(DTR_SITE_PAGES README.md
   docs/BACKGROUND.md datasets/plaza/README.md CONTRIBUTING.md CHANGELOG.md)
 file(GLOB_RECURSE pages RELATIVE ${PROJECT_SOURCE_DIR} CONFIGURE_DEPENDS docs/*.md)
 list(REMOVE_ITEM pages ${DTR_SITE_PAGES})
-if(pages)
-  message(FATAL_ERROR "cmake/Site.cmake: DTR_SITE_PAGES lacks ${pages}")
-endif()
+list(APPEND DTR_SITE_PAGES ${pages})
 
 find_program(DTR_DOXYGEN doxygen)
 find_path(DTR_KATEX katex.min.js PATHS /usr/share/javascript/katex NO_DEFAULT_PATH)

@@ -57,14 +57,19 @@ class Page(HTMLParser):
                 self.targets.append(value)
 
 
-def faults_of_site(folder):
-    """A line for each link of the pages in `folder` that leads to no file of it, or to no anchor of a page."""
+def faults_of_site(folder, others=()):
+    """A line for each link of the pages in `folder` that leads to no file of it, or to no anchor of a page.
+
+    others: addresses that a script has.
+    """
     pages = {path: Page(path) for path in sorted(folder.rglob("*.html"))}
     if not pages:
         return [f"{folder}: expected pages, found none"]
     faults = []
-    for path, page in pages.items():
-        for target in dict.fromkeys(page.targets):
+    targets = {path: page.targets for path, page in pages.items()}
+    targets[folder / "(script)"] = others
+    for path in targets:
+        for target in dict.fromkeys(targets[path]):
             if EXTERNAL.match(target):
                 continue
             file, _, anchor = unquote(target).partition("#")

@@ -64,6 +64,11 @@ class SiteTest(Folder):
         self.assertEqual(faults_of_site(self.root), ["a.html: b.html: no such file of the site", "a.html: #x: no such anchor",
                                                      "a.html: i.png: no such file of the site"])
 
+    def test_addresses_of_a_script_are_checked_too(self):
+        self.write("a.html", '<h1 id="x">x</h1>')
+        self.assertEqual(faults_of_site(self.root, ["a.html#x"]), [])
+        self.assertEqual(faults_of_site(self.root, ["a.html#y"]), ["(script): a.html#y: no such anchor"])
+
     def test_a_folder_without_pages_is_a_fault(self):
         self.assertEqual(len(faults_of_site(self.root)), 1)
 
