@@ -70,14 +70,14 @@ bool SetChromaPosition(SwsContext* scaler, const FrameKind& kind) {
   const AVPixFmtDescriptor& format = Descriptor(kind.format);
   const auto location = static_cast<AVChromaLocation>(kind.chroma_location);
   if (format.log2_chroma_w != 1 || format.log2_chroma_h != 1) return false;
-  if (location == AVCHROMA_LOC_UNSPECIFIED || location == AVCHROMA_LOC_LEFT ||
-      location == AVCHROMA_LOC_CENTER) {
-    return false;
-  }
-  int x = 0, y = 0;  // in 1/256 of a luma pixel
-  if (avcodec_enum_to_chroma_pos(&x, &y, location) < 0) return false;
-  av_opt_set_int(scaler, "src_h_chr_pos", x, 0);
-  av_opt_set_int(scaler, "src_v_chr_pos", y, 0);
+  const bool top = location == AVCHROMA_LOC_TOPLEFT || location == AVCHROMA_LOC_TOP;
+  const bool bottom = location == AVCHROMA_LOC_BOTTOMLEFT || location == AVCHROMA_LOC_BOTTOM;
+  if (!top && !bottom) return false;
+  const bool between = location == AVCHROMA_LOC_TOP || location == AVCHROMA_LOC_BOTTOM;
+  // In 1/256 of a luma pixel, from the first one; FFmpeg's function for it has another name and
+  // another library since version 6.
+  av_opt_set_int(scaler, "src_h_chr_pos", between ? 128 : 0, 0);
+  av_opt_set_int(scaler, "src_v_chr_pos", bottom ? 256 : 0, 0);
   return true;
 }
 

@@ -6,6 +6,11 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+<<<<<<< HEAD
+=======
+#include <mutex>
+#include <span>
+>>>>>>> 7ecf5e54 (capture: video by FFmpeg 6.1 and later: side data of the codec's parameters, the flag of interlaced frames, positions of chroma)
 #include <string_view>
 
 #include "dtr/base/error.h"
@@ -27,6 +32,30 @@ bool BeginsAsTransportStream(std::string_view begin) {
     return begin[first] == 'G' && begin[first + bytes] == 'G' && begin[first + 2 * bytes] == 'G';
   };
   return packets(0, 188) || packets(4, 192);
+}
+
+bool IsInterlaced(const AVFrame& frame) {
+#ifdef AV_FRAME_FLAG_INTERLACED  // since FFmpeg 6.1
+  return (frame.flags & AV_FRAME_FLAG_INTERLACED) != 0;
+#else
+  return frame.interlaced_frame != 0;
+#endif
+}
+
+// What a stream says of all its frames; empty where it says nothing.
+std::span<const std::uint8_t> SideDataOf(const AVStream& stream, AVPacketSideDataType type) {
+#if LIBAVFORMAT_VERSION_INT >= AV_VERSION_INT(60, 15, 100)  // since FFmpeg 6.1
+  const AVCodecParameters& codec = *stream.codecpar;
+  const AVPacketSideData* found =
+      av_packet_side_data_get(codec.coded_side_data, codec.nb_coded_side_data, type);
+  if (found == nullptr) return {};
+  return {found->data, found->size};
+#else
+  size_t bytes = 0;
+  const std::uint8_t* data = av_stream_get_side_data(&stream, type, &bytes);
+  if (data == nullptr) return {};
+  return {data, bytes};
+#endif
 }
 
 // FFmpeg would follow a playlist to files and hosts that it names, whatever the file is called:
@@ -197,7 +226,7 @@ const AVFrame* VideoDecoder::NextUnnumbered() {
       draining_ = deinterlacer_->Add(nullptr);
       continue;
     }
-    if (frame_->interlaced_frame != 0) {
+    if (IsInterlaced(*frame_)) {
       ++deinterlaced_;
       if (!deinterlacer_) deinterlacer_.emplace(*frame_, stream().time_base);
     }
@@ -224,16 +253,14 @@ std::optional<DisplayMatrix> VideoDecoder::MatrixOf(const AVFrame& frame) const 
   if (const AVFrameSideData* own = av_frame_get_side_data(&frame, AV_FRAME_DATA_DISPLAYMATRIX)) {
     return MatrixIn(own->data, own->size);
   }
-  size_t bytes = 0;
-  const void* data = av_stream_get_side_data(&stream(), AV_PKT_DATA_DISPLAYMATRIX, &bytes);
-  return MatrixIn(data, bytes);
+  const auto data = SideDataOf(stream(), AV_PKT_DATA_DISPLAYMATRIX);
+  return MatrixIn(data.data(), data.size());
 }
 
 std::string VideoDecoder::Projection() const {
-  size_t bytes = 0;
-  const auto* data = av_stream_get_side_data(&stream(), AV_PKT_DATA_SPHERICAL, &bytes);
-  if (data == nullptr || bytes < sizeof(AVSphericalMapping)) return "";
-  switch (reinterpret_cast<const AVSphericalMapping*>(data)->projection) {
+  const auto data = SideDataOf(stream(), AV_PKT_DATA_SPHERICAL);
+  if (data.size() < sizeof(AVSphericalMapping)) return "";
+  switch (reinterpret_cast<const AVSphericalMapping*>(data.data())->projection) {
     case AV_SPHERICAL_EQUIRECTANGULAR:
       return "equirectangular";
     case AV_SPHERICAL_CUBEMAP:
@@ -245,10 +272,9 @@ std::string VideoDecoder::Projection() const {
 
 bool VideoDecoder::NeedsDolbyVision() const {
   constexpr int kProfileWithoutBase = 5;
-  size_t bytes = 0;
-  const auto* data = av_stream_get_side_data(&stream(), AV_PKT_DATA_DOVI_CONF, &bytes);
-  if (data == nullptr || bytes < sizeof(AVDOVIDecoderConfigurationRecord)) return false;
-  return reinterpret_cast<const AVDOVIDecoderConfigurationRecord*>(data)->dv_profile ==
+  const auto data = SideDataOf(stream(), AV_PKT_DATA_DOVI_CONF);
+  if (data.size() < sizeof(AVDOVIDecoderConfigurationRecord)) return false;
+  return reinterpret_cast<const AVDOVIDecoderConfigurationRecord*>(data.data())->dv_profile ==
          kProfileWithoutBase;
 }
 
