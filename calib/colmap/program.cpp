@@ -125,7 +125,7 @@ Arguments& Arguments::Add(std::initializer_list<const char*> names, const std::s
   if (name == nullptr) {
     throw Error(
         fmt::format("colmap {}: expected the option --{}, found a version ({}) without it; "
-                    "install another version (3.8 is the one this was tested with)",
+                    "install another version (tested with 3.8 and 3.10)",
                     command_, *names.begin(), program_.version()));
   }
   argv_.push_back(std::string("--") + name);

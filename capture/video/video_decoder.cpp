@@ -6,11 +6,7 @@
 #include <array>
 #include <cmath>
 #include <fstream>
-<<<<<<< HEAD
-=======
-#include <mutex>
 #include <span>
->>>>>>> 7ecf5e54 (capture: video by FFmpeg 6.1 and later: side data of the codec's parameters, the flag of interlaced frames, positions of chroma)
 #include <string_view>
 
 #include "dtr/base/error.h"

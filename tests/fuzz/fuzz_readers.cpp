@@ -4,6 +4,7 @@
 // the folder that is named.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>

@@ -6,6 +6,7 @@
 #include <TMIV/MivBitstream/SequenceConfig.h>
 #include <TMIV/Renderer/Engine.h>
 
+#include <cstdint>
 #include <cstdio>
 #include <fstream>
 #include <iterator>
