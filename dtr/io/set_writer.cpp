@@ -11,6 +11,7 @@
 #include "dtr/io/held_out_files.h"
 #include "dtr/io/json_fields.h"
 #include "dtr/io/mesh_io.h"
+#include "dtr/io/partial_set.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/set_json.h"
 #include "dtr/io/shared_files.h"
@@ -20,59 +21,6 @@ namespace dtr::io {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr char kWork[] = "work";
-constexpr char kFingerprint[] = "work/fingerprint.json";
-constexpr char kLockName[] = "lock";
-constexpr char kLock[] = "work/lock";
-constexpr char kSparseFile[] = "sparse.bin";
-constexpr char kReportFolder[] = "report";
-constexpr std::uintmax_t kRecordLimitBytes = 1 << 24;
-constexpr const char* kPixelFolders[] = {"images", "mask",  "depth", "completed", "sigma",
-                                         "mesh",   "still", "video", "held_out"};
-
-// "a/b.dtr/" and "a/b.dtr" are one folder.
-fs::path WithoutSlash(const fs::path& target) {
-  const fs::path path = fs::absolute(target).lexically_normal();
-  return path.has_filename() ? path : path.parent_path();
-}
-
-fs::path Beside(const fs::path& target, const std::string& suffix) {
-  return target.parent_path() / (target.filename().string() + suffix);
-}
-
-std::string Canonical(const std::string& fingerprint_json, const std::string& where) {
-  const Json parsed = ParseJson(fingerprint_json, where);
-  if (!parsed.is_object()) throw Error(where + ": expected a JSON object");
-  return nlohmann::json(parsed).dump(2) + "\n";  // sorts the keys
-}
-
-// The names of what differs in two canonical fingerprints; empty where one is none.
-std::string DifferingKeys(const std::string& a, const std::string& b) {
-  const nlohmann::json left = nlohmann::json::parse(a, nullptr, false),
-                       right = nlohmann::json::parse(b, nullptr, false);
-  if (!left.is_object() || !right.is_object()) return "";
-  std::set<std::string> keys;
-  for (const auto* side : {&left, &right}) {
-    for (const auto& [key, value] : side->items()) {
-      if (left.value(key, nlohmann::json()) != right.value(key, nlohmann::json())) keys.insert(key);
-    }
-  }
-  std::string names;
-  for (const std::string& key : keys) names += (names.empty() ? "" : ", ") + key;
-  return names;
-}
-
-// True when a partial folder has more in it than what the constructor itself puts there. What a
-// killed process had not finished to write is nobody's work.
-bool HoldsWork(const fs::path& partial) {
-  for (const auto& entry : fs::recursive_directory_iterator(partial)) {
-    const fs::path inside = entry.path().lexically_relative(partial);
-    if (entry.is_directory() || IsTemporaryFile(inside)) continue;
-    if (inside != kFingerprint && inside != kLock) return true;
-  }
-  return false;
-}
 
 StoredFile Describe(const fs::path& folder, const std::string& path) {
   return {path, Sha256OfFile(folder / path), fs::file_size(folder / path)};
@@ -114,35 +62,15 @@ void ExpectPixels(const View& view) {
   }
 }
 
-// The file system's own errors, as ours: they name the file already.
-template <typename Function>
-auto AsError(const Function& function) {
-  try {
-    return function();
-  } catch (const fs::filesystem_error& error) {
-    throw Error(std::string("set cannot be written: ") + error.what());
-  }
-}
-
 }  // namespace
 
-struct SetWriter::State {
-  fs::path target, partial, aside, done_work;
-  bool force = false, resumed = false, finished = false;
-  bool joined = false;  // beside other processes
+struct SetWriter::State : PartialSet {
+  using PartialSet::PartialSet;
   ImageCoding image_coding = ImageCoding::kPng;
-  std::optional<FileLock> lock;
 
   fs::path RecordOf(const std::string& id) const {
     return partial / kWork / "views" / (id + ".json");
   }
-  void Recover() const;
-  void RecoverWork() const;
-  void ExpectReplaceable() const;
-  std::optional<FileLock> Lock(const fs::path& file) const;
-  void OpenPartial(const std::string& fingerprint);
-  void JoinPartial(const std::string& fingerprint);
-  void ExpectFingerprint(const std::string& fingerprint) const;
   std::string PathOf(const View& view, const std::string& kind, const std::string& extension) const;
   template <typename Write>
   StoredFile Store(const std::string& path, const Write& write) const;
@@ -151,110 +79,7 @@ struct SetWriter::State {
   void WriteView(View& view, LengthUnit unit) const;
   bool RestoreView(View& view) const;
   void RemoveUnnamed(const DtrSet& set) const;
-  void MoveIntoPlace();
 };
-
-// A replacement that was cut off between its two renames: the old set goes back.
-void SetWriter::State::Recover() const {
-  RecoverWork();
-  if (!fs::exists(aside / kSetFile)) return;
-  if (fs::exists(target / kSetFile)) {
-    RemoveFolder(aside, kSetFile);  // what it is known by goes last
-  } else if (!fs::exists(target) || IsEmptyFolder(target)) {
-    Rename(aside, target);
-  }  // what is no set took its place: both stay
-}
-
-// A set that was cut off on its way into place has its checkpoints beside it: they go back to one
-// that is not there yet, and are of no more use to one that is.
-void SetWriter::State::RecoverWork() const {
-  const bool ours = fs::exists(done_work / kLockName);
-  if (!ours && !IsEmptyFolder(done_work)) return;
-  const std::optional<FileLock> nobody_at_work = Lock(done_work / kLockName);
-  if (fs::exists(partial) && !fs::exists(partial / kWork)) {
-    Rename(done_work, partial / kWork);
-  } else {
-    RemoveFolder(done_work, kLockName);
-  }
-}
-
-void SetWriter::State::ExpectReplaceable() const {
-  if (!fs::exists(fs::symlink_status(target))) return;
-  if (!fs::is_directory(target)) {
-    throw UsageError(target.string() + ": expected no such folder yet, found a file; " +
-                     "choose another name");
-  }
-  if (!force) {
-    throw UsageError(target.string() + ": expected no such folder yet, found one; " +
-                     "choose another name or pass `force` to replace it");
-  }
-  if (!IsEmptyFolder(target) && !fs::is_regular_file(target / kSetFile)) {
-    throw UsageError(target.string() + ": expected a D+TR set to replace, found something else; " +
-                     "it is left alone");
-  }
-  RejectForeign(target, [](const std::string& name) {
-    return name == kSetFile || name == kSparseFile || name == kReportFolder ||
-           std::find(std::begin(kPixelFolders), std::end(kPixelFolders), name) !=
-               std::end(kPixelFolders);
-  });
-  if (fs::is_directory(target / kReportFolder)) {
-    RejectForeign(target / kReportFolder, [](const std::string& name) {
-      return name == "index.html" || name == "run.json";
-    });
-  }
-  // At the end of the work the old set would find no room.
-  if (fs::exists(fs::symlink_status(aside)) && !IsEmptyFolder(aside)) {
-    throw UsageError(aside.string() + ": expected nothing, for " + target.string() +
-                     " to make room for the new set; move it away");
-  }
-}
-
-std::optional<FileLock> SetWriter::State::Lock(const fs::path& file) const {
-  if (auto taken = FileLock::Try(file)) return taken;
-  throw UsageError(partial.string() + ": another process is writing this set; wait for it");
-}
-
-void SetWriter::State::OpenPartial(const std::string& fingerprint) {
-  std::error_code error;
-  if (fs::exists(partial) && !fs::is_directory(partial)) {
-    throw UsageError(partial.string() +
-                     ": expected a folder or nothing, found a file; move it away");
-  }
-  const bool foreign =
-      fs::exists(partial) && HoldsWork(partial) && !fs::exists(partial / kFingerprint);
-  if (!foreign) fs::create_directories(partial / kWork, error);
-  if (error) throw Error(partial.string() + ": cannot be made: " + error.message());
-  if (!foreign) lock = Lock(partial / kLock);
-  const bool holds_work = HoldsWork(partial);
-  if (holds_work) ExpectFingerprint(fingerprint);
-  RemoveTemporaryFiles(partial);  // of a run that was killed
-  resumed = holds_work;
-  if (!resumed) WriteFileAtomically(partial / kFingerprint, fingerprint);
-}
-
-void SetWriter::State::JoinPartial(const std::string& fingerprint) {
-  if (!fs::exists(partial / kFingerprint)) {
-    throw UsageError(partial.string() +
-                     ": expected a build to join, found none; run its stage capture first");
-  }
-  lock = FileLock::Try(partial / kLock, FileLock::Kind::kShared);
-  if (!lock) {
-    throw UsageError(partial.string() +
-                     ": another process is writing the whole of this set; wait for it");
-  }
-  ExpectFingerprint(fingerprint);
-  resumed = joined = true;
-}
-
-void SetWriter::State::ExpectFingerprint(const std::string& fingerprint) const {
-  const bool foreign = !fs::exists(partial / kFingerprint);
-  const std::string found = foreign ? "" : ReadFile(partial / kFingerprint, kRecordLimitBytes);
-  if (found == fingerprint) return;
-  const std::string differ = DifferingKeys(found, fingerprint);
-  throw UsageError(partial.string() + ": expected work of the same inputs and options, found " +
-                   "others" + (differ.empty() ? "" : " (" + differ + " differ)") +
-                   "; run that command again to finish it, or delete the folder");
-}
 
 std::string SetWriter::State::PathOf(const View& view, const std::string& kind,
                                      const std::string& extension) const {
@@ -274,18 +99,12 @@ StoredFile SetWriter::State::Store(const std::string& path, const Write& write) 
 
 SetWriter::SetWriter(const fs::path& target, const std::string& fingerprint_json, bool force,
                      ImageCoding image_coding)
-    : state_(std::make_unique<State>()) {
-  const std::string fingerprint = Canonical(fingerprint_json, "fingerprint");
-  state_->target = WithoutSlash(target);
-  state_->partial = Beside(state_->target, ".partial");
-  state_->aside = Beside(state_->target, ".replaced");
-  state_->done_work = Beside(state_->target, ".partial.work");
-  state_->force = force;
+    : state_(std::make_unique<State>(target, force)) {
   state_->image_coding = image_coding;
   AsError([&] {
     state_->Recover();
     state_->ExpectReplaceable();
-    state_->OpenPartial(fingerprint);
+    state_->Open(fingerprint_json);
   });
 }
 
@@ -293,39 +112,23 @@ SetWriter::SetWriter(std::unique_ptr<State> state) : state_(std::move(state)) {}
 SetWriter::SetWriter(SetWriter&&) noexcept = default;
 
 SetWriter SetWriter::Join(const fs::path& target, const std::string& fingerprint_json, bool force) {
-  auto state = std::make_unique<State>();
-  state->target = WithoutSlash(target);
-  state->partial = Beside(state->target, ".partial");
-  state->aside = Beside(state->target, ".replaced");
-  state->done_work = Beside(state->target, ".partial.work");
-  state->force = force;
+  auto state = std::make_unique<State>(target, force);
   AsError([&] {
     state->ExpectReplaceable();
-    state->JoinPartial(Canonical(fingerprint_json, "fingerprint"));
+    state->Join(fingerprint_json);
   });
   return SetWriter(std::move(state));
 }
 
 void SetWriter::RequireTarget(const fs::path& target, bool force) {
-  State state;
-  state.target = WithoutSlash(target);
-  state.aside = Beside(state.target, ".replaced");
-  state.force = force;
+  const State state(target, force);
   // What a run that was cut off half-way left beside it is the constructor's to put right.
-  const bool cut_off =
-      fs::exists(state.aside / kSetFile) || fs::exists(Beside(state.target, ".partial.work"));
-  if (!cut_off) AsError([&] { state.ExpectReplaceable(); });
+  if (!state.WasCutOff()) AsError([&] { state.ExpectReplaceable(); });
 }
 
 SetWriter::~SetWriter() {
-  if (!state_ || state_->joined) return;
-  std::error_code ignored;
-  try {
-    // Nothing was done: leave nothing that would stand in the way of a corrected command.
-    if (!state_->finished && !HoldsWork(state_->partial)) fs::remove_all(state_->partial, ignored);
-  } catch (const fs::filesystem_error&) {
-    // The folder was taken away while we worked; there is nothing left to tidy.
-  }
+  // Nothing was done: leave nothing that would stand in the way of a corrected command.
+  if (state_ && !state_->joined && !state_->finished) state_->RemoveUnused();
 }
 
 void SetWriter::Discard() noexcept {
@@ -338,9 +141,7 @@ void SetWriter::Discard() noexcept {
 
 const fs::path& SetWriter::folder() const { return state_->partial; }
 fs::path SetWriter::work_folder() const { return state_->partial / kWork; }
-fs::path SetWriter::WorkFolderOf(const fs::path& target) {
-  return Beside(WithoutSlash(target), ".partial") / kWork;
-}
+fs::path SetWriter::WorkFolderOf(const fs::path& target) { return io::WorkFolderOf(target); }
 bool SetWriter::resumed() const { return state_->resumed; }
 
 void SetWriter::WriteView(View& view, LengthUnit unit) {
@@ -520,31 +321,6 @@ void SetWriter::State::RemoveUnnamed(const DtrSet& set) const {
   for (const fs::path& file : unnamed) fs::remove(file);
   for (const char* folder : kPixelFolders) {
     if (IsEmptyFolder(partial / folder)) fs::remove(partial / folder);
-  }
-}
-
-void SetWriter::State::MoveIntoPlace() {
-  ExpectReplaceable();
-  const bool replace = fs::exists(target);
-  // A finished set never has checkpoints in it: they leave first (Recover() knows every moment).
-  Rename(partial / kWork, done_work);
-  try {
-    SyncTree(partial);
-    if (replace) Rename(target, aside);
-    Rename(partial, target);
-  } catch (...) {
-    if (replace && !fs::exists(target)) Rename(aside, target);
-    Rename(done_work, partial / kWork);
-    throw;
-  }
-  SyncFolder(target.parent_path());
-  finished = true;
-  try {
-    RemoveFolder(done_work, kLockName);
-    if (replace) RemoveFolder(aside, kSetFile);
-  } catch (const fs::filesystem_error& error) {
-    throw Error(target.string() + ": finished, but what it no longer needs cannot be deleted: " +
-                error.code().message());
   }
 }
 
