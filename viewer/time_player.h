@@ -6,10 +6,16 @@
 
 namespace dtr::viewer {
 
-/// Round and round at the set's own pace. Where images take longer than time steps last, time steps
-/// are left out; where one takes very long (its views are read), time waits for it.
+/// At the set's own pace or another speed, in a loop or once. Where images take longer than time
+/// steps last, time steps are left out; where one takes very long (its views are read), time waits
+/// for it.
 class TimePlayer {
  public:
+  static constexpr double kMinSpeed = 0.125, kMaxSpeed = 8;
+
+  double speed = 1;  ///< seconds of the set in a second; kMinSpeed to kMaxSpeed
+  bool loop = true;  ///< begins again after the last time step; else it stops there
+
   bool playing() const { return playing_; }
   void StartOrStop() { playing_ = !playing_; }
   void Stop() { playing_ = false; }

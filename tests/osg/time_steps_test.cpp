@@ -1,6 +1,7 @@
 // Moving sets as nodes: which time step is shown, by hand and by the viewer's time.
 #include "tests/gl/gl_testing.h"
 // clang-format keeps this group apart.
+#include <limits>
 #include <osg/MatrixTransform>
 
 #include "dtr/base/error.h"
@@ -129,6 +130,17 @@ bool Press(osgDTR::KeyHandler& handler, int key) {
   event->setKey(key);
   NoViewer viewer;
   return handler.handle(*event, viewer);
+}
+
+TEST(TimeSteps, AHostsClockChoosesTheTimeStep) {
+  const osg::ref_ptr<DepthTR> node = NodeOf(MovingSquare());
+  const double second = node->getTimeStepTime(1);
+  node->setTime(second + 1e-6);
+  EXPECT_EQ(node->getTimeStep(), 1);
+  node->setTime(second - 1e-6);
+  EXPECT_EQ(node->getTimeStep(), 0);
+  EXPECT_THROW(node->setTime(std::numeric_limits<double>::quiet_NaN()), UsageError);
+  EXPECT_EQ(node->getTimeStep(), 0);
 }
 
 TEST(TimeStepKeys, StepAndPlay) {

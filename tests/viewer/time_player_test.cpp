@@ -36,6 +36,28 @@ TEST(TimePlayer, GoesOnFromATimeStepThatWasChosenByHand) {
   EXPECT_EQ(player.Advance(0.1, clock, 3), 0u);
 }
 
+TEST(TimePlayer, RunsAtAnotherSpeed) {
+  const FrameClock clock = Quarters();
+  TimePlayer player;
+  player.speed = 4;
+  player.StartOrStop();
+  size_t shown = 0;
+  std::vector<size_t> seen;
+  for (int i = 0; i < 5; ++i) seen.push_back(shown = player.Advance(1.0 / 16, clock, shown));
+  EXPECT_EQ(seen, (std::vector<size_t>{1, 2, 3, 0, 1}));
+}
+
+TEST(TimePlayer, PlayedOnceItStopsAtTheLastTimeStep) {
+  const FrameClock clock = Quarters();
+  TimePlayer player;
+  player.loop = false;
+  player.StartOrStop();
+  size_t shown = 2;
+  for (int i = 0; i < 20; ++i) shown = player.Advance(1.0 / 16, clock, shown);
+  EXPECT_EQ(shown, 3u);
+  EXPECT_FALSE(player.playing());
+}
+
 TEST(TimePlayer, ASlowFrameLeavesNoTimeStepOut) {
   const FrameClock clock = Quarters();
   TimePlayer player;

@@ -4,6 +4,7 @@
 #include <epoxy/gl.h>
 // clang-format keeps this group apart.
 #include <GLFW/glfw3.h>
+#include <fmt/format.h>
 #include <imgui.h>
 
 #include <algorithm>
@@ -202,6 +203,7 @@ class App {
       case Action::kOpenPath:
         return path_dialog_.Open();
       case Action::kFlyPath:
+        if (paths_.flight().keys().empty() && session_->clock().frames() > 1) return PlayOrStop();
         return paths_.flight().StartOrStop(controller().camera().camera);
       case Action::kRecord:
         return paths_.StartOrStopRecording(controller().camera().camera, session_->opened().set);
@@ -211,6 +213,10 @@ class App {
         return StepTimeStep(-1);
       case Action::kPlayTime:
         return PlayOrStop();
+      case Action::kSlower:
+        return SetSpeed(time_.speed / 2);
+      case Action::kFaster:
+        return SetSpeed(time_.speed * 2);
       case Action::kNextShown:
         return StepShown(1);
       case Action::kPreviousShown:
@@ -239,6 +245,11 @@ class App {
     Tell(
         "only dynamic sets can be played: this one has a single time step (dtr join makes moving "
         "sets)");
+  }
+
+  void SetSpeed(double speed) {
+    time_.speed = std::clamp(speed, TimePlayer::kMinSpeed, TimePlayer::kMaxSpeed);
+    Tell(fmt::format("time runs {} times as fast", time_.speed));
   }
 
   /// In the background, so that it is there when its turn comes.
@@ -323,7 +334,7 @@ class App {
                        session_->maker.colours(),
                        paths_.flight(),
                        {static_cast<int>(session_->clock().frames()), static_cast<int>(time_step),
-                        session_->clock().StartOf(time_step), time_.playing()},
+                        session_->clock().StartOf(time_step), time_},
                        paths_.Progress(),
                        message_,
                        window_ms_,

@@ -24,10 +24,11 @@ constexpr std::array kHelp{
     HelpLine{"H", "leave the nearest view out, take it in again"},
     HelpLine{"M", "mark the point under the cursor; two marks: their distance"},
     HelpLine{"T", "play a dynamic set, stop"},
+    HelpLine{", .", "a dynamic set at half, at twice the speed"},
     HelpLine{"N, B", "next, previous time step of a dynamic set"},
     HelpLine{"K", "add this camera to the path"},
     HelpLine{"O", "load a path file; or drop one onto the window"},
-    HelpLine{"Space", "fly along the path, stop"},
+    HelpLine{"Space", "fly along the path, stop; without a path: as T"},
     HelpLine{"R", "record the path as MP4, stop"},
     HelpLine{"P", "save the image"},
     HelpLine{"F12", "save the window"},
@@ -54,6 +55,7 @@ constexpr std::array kBindings{
     Binding{GLFW_KEY_O, Action::kOpenPath},     Binding{GLFW_KEY_SPACE, Action::kFlyPath},
     Binding{GLFW_KEY_R, Action::kRecord},       Binding{GLFW_KEY_T, Action::kPlayTime},
     Binding{GLFW_KEY_N, Action::kNextTimeStep}, Binding{GLFW_KEY_B, Action::kPreviousTimeStep},
+    Binding{GLFW_KEY_COMMA, Action::kSlower},   Binding{GLFW_KEY_PERIOD, Action::kFaster},
 };
 
 }  // namespace

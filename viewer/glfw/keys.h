@@ -29,6 +29,8 @@ enum class Action {
   kNextTimeStep,
   kPreviousTimeStep,
   kPlayTime,
+  kSlower,
+  kFaster,
   kNextShown,
   kPreviousShown,
   kQuit,

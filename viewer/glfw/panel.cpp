@@ -148,9 +148,12 @@ void TimeControls(Widgets& widgets, PanelModel& model) {
   ImGui::SameLine();
   if (widgets.Arrow("later", ImGuiDir_Right)) model.pressed.push_back(Action::kNextTimeStep);
   ImGui::SameLine();
-  if (widgets.Button("play", time.playing ? "stand still" : "play")) {
+  if (widgets.Button("play", time.player.playing() ? "stand still" : "play")) {
     model.pressed.push_back(Action::kPlayTime);
   }
+  ImGui::SameLine();
+  widgets.Check("loop", "loop", time.player.loop);
+  widgets.Real("speed", time.player.speed, TimePlayer::kMinSpeed, TimePlayer::kMaxSpeed);
 }
 
 void PathControls(Widgets& widgets, PanelModel& model) {

@@ -9,6 +9,7 @@
 #include "viewer/glfw/inspection.h"
 #include "viewer/glfw/keys.h"
 #include "viewer/glfw/user_interface.h"
+#include "viewer/time_player.h"
 
 namespace dtr::viewer {
 
@@ -16,7 +17,7 @@ namespace dtr::viewer {
 struct TimeModel {
   int time_steps = 1, time_step = 0;
   double seconds = 0;  ///< since the first time step
-  bool playing = false;
+  TimePlayer& player;
 };
 
 /// What the panel shows and changes.

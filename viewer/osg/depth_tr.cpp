@@ -5,6 +5,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "dtr/base/error.h"
@@ -101,6 +102,14 @@ void DepthTR::setTimeStep(int time_step) {
   }
   played_from_s_.reset();  // goes on from here
   ShowTimeStep(static_cast<size_t>(time_step));
+}
+
+void DepthTR::setTime(double seconds) {
+  if (!std::isfinite(seconds)) {
+    throw dtr::UsageError("DepthTR: expected a finite time, found " + std::to_string(seconds));
+  }
+  const auto set = drawable_->state_->Get().set;
+  if (set) setTimeStep(static_cast<int>(set->clock.FrameAt(seconds)));
 }
 
 double DepthTR::getTimeStepTime(int time_step) const {

@@ -67,6 +67,10 @@ class DepthTR : public osg::Geode {
   int getTimeStep() const;
   /// From 0; throws dtr::UsageError for others.
   void setTimeStep(int time_step);
+  /// The time step at so many seconds from the first one's start, where the set has come round any
+  /// number of times: for hosts with a clock of their own. Throws dtr::UsageError for a time that
+  /// is not finite.
+  void setTime(double seconds);
   /// Seconds from the first time step to this one.
   double getTimeStepTime(int time_step) const;
   /// Goes on from the shown time step with the viewer's simulation time, round and round, or stops.
