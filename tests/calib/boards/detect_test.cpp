@@ -115,10 +115,10 @@ TEST(DetectBoard, CharucoCornersAreWhereTheyAreWholePartlyAndInverted) {
   }
 }
 
-TEST(BoardPrint, BeginsWithABlackSquareAndTheFirstMarkerBesideItWithAnyVersionOfOpenCv) {
+TEST(CharucoPrint, BeginsWithABlackSquareAndTheFirstMarkerBesideItWithAnyVersionOfOpenCv) {
   for (const int rows : {5, 6}) {  // of squares
     const Board board{Board::Kind::kCharuco, 4, rows - 1, 0.04, 0.7, "DICT_4X4_50", false};
-    const BoardPrint print(board);
+    const testing::BoardPrint print(board);
     EXPECT_EQ(print.Brightness({0.05, 0.05}), 0) << rows << " rows";
     EXPECT_EQ(print.Brightness({1.05, 0.05}), 1) << rows << " rows";  // paper around the marker
     EXPECT_EQ(print.Brightness({1.2, 0.2}), 0) << rows << " rows";    // its frame
