@@ -191,12 +191,17 @@ Json HostInfo() {
 
 namespace {
 
+// "73 kB", "1.4 MB".
+std::string SizeText(std::uint64_t bytes) {
+  return bytes < 1'000'000 ? std::to_string((bytes + 999) / 1000) + " kB" : Megabytes(bytes);
+}
+
 std::string PartsLine(const std::vector<SetPart>& parts) {
   std::string line;
   for (const SetPart& part : parts) {
     std::string name = part.name;
     std::replace(name.begin(), name.end(), '_', ' ');
-    line += (line.empty() ? "" : ", ") + name + " " + Megabytes(part.bytes);
+    line += (line.empty() ? "" : ", ") + name + " " + SizeText(part.bytes);
   }
   return line;
 }
