@@ -30,8 +30,10 @@ Around AroundOf(std::span<const CellView> views, const std::vector<int>& neighbo
   return around;
 }
 
-std::vector<ScenePlane> PlanesOf(std::span<const CellView> views,
-                                 std::span<const std::vector<int>> neighbours, int threads) {
+}  // namespace
+
+std::vector<ScenePlane> PlanesToChoose(std::span<const CellView> views,
+                                       std::span<const std::vector<int>> neighbours, int threads) {
   std::vector<ScenePlane> planes = FindScenePlanes(views, kMeasuredPlanes, threads);
   std::vector<Neighbourhood> around;
   for (size_t i = 0; i < views.size(); ++i) {
@@ -43,15 +45,13 @@ std::vector<ScenePlane> PlanesOf(std::span<const CellView> views,
   return planes;
 }
 
-}  // namespace
-
 std::vector<CompletedCells> CompleteCells(std::span<const CellView> views,
-                                          std::span<const std::vector<int>> neighbours, int threads,
+                                          std::span<const std::vector<int>> neighbours,
+                                          std::span<const ScenePlane> planes, int threads,
                                           Progress& progress) {
   const int count = static_cast<int>(views.size());
   progress.Stage("completion", kPasses * count);
   std::atomic<int> done = 0;
-  const std::vector<ScenePlane> planes = PlanesOf(views, neighbours, threads);
   std::vector<CompletedCells> completed;
   for (int pass = 0; pass < kPasses; ++pass) {
     std::vector<CompletedCells> next(views.size());

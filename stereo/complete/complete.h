@@ -7,16 +7,23 @@
 #include "dtr/base/progress.h"
 #include "stereo/complete/cells.h"
 #include "stereo/complete/label_cells.h"
+#include "stereo/complete/scene_planes.h"
 
 namespace dtr::stereo {
 
+/// The planes of the scene that cells without a measured surface choose among (docs/METHODS.md,
+/// 11.1): the largest measured ones, and those that a sweep finds. `neighbours`: of each view,
+/// indices of others, best first. Deterministic for any number of threads.
+std::vector<ScenePlane> PlanesToChoose(std::span<const CellView> views,
+                                       std::span<const std::vector<int>> neighbours, int threads);
+
 /// Planes for all cells of all views (docs/METHODS.md, 11.1): measured surfaces that go on, those
-/// of other views, the planes of the scene, or infinitely far, whichever the photos agree on, in
-/// two passes: the second holds each view to what the others chose. `neighbours`: of each view,
-/// indices of others, best first. Deterministic for any number of threads. Throws Interrupted
-/// between views.
+/// of other views, `planes` of the scene, or infinitely far, whichever the photos agree on, in two
+/// passes: the second holds each view to what the others chose. `neighbours`: as above.
+/// Deterministic for any number of threads. Throws Interrupted between views.
 std::vector<CompletedCells> CompleteCells(std::span<const CellView> views,
-                                          std::span<const std::vector<int>> neighbours, int threads,
+                                          std::span<const std::vector<int>> neighbours,
+                                          std::span<const ScenePlane> planes, int threads,
                                           Progress& progress);
 
 /// Bytes that CompleteCells takes at most for views of these cameras, their cells included.

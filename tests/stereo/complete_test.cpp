@@ -72,7 +72,8 @@ struct Row {
     std::vector<CellView> cells;
     for (const View& view : views) cells.push_back(MakeCells(view));
     SilentProgress silent;
-    const auto completed = CompleteCells(cells, neighbours, threads, silent);
+    const auto completed = CompleteCells(
+        cells, neighbours, PlanesToChoose(cells, neighbours, threads), threads, silent);
     std::vector<DepthImage> depths;
     for (size_t i = 0; i < views.size(); ++i) {
       depths.push_back(ExpandCells(views[i], cells[i], completed[i], kFarZ));

@@ -80,8 +80,9 @@ DepthImage Completed(const stereo::CellView& cells, const stereo::CompletedCells
 
 }  // namespace
 
-void CompleteDepth(DtrSet& set, const SparseScene& sparse, io::SetWriter& writer, int threads,
-                   double memory_gb, Progress& progress, const KnownCompletion& known) {
+std::vector<stereo::ScenePlane> CompleteDepth(DtrSet& set, const SparseScene& sparse,
+                                              io::SetWriter& writer, int threads, double memory_gb,
+                                              Progress& progress, const KnownCompletion& known) {
   std::vector<View>& views = set.frames.front().views;
   std::vector<int> sources;
   std::vector<PinholeCamera> cameras;
@@ -98,7 +99,7 @@ void CompleteDepth(DtrSet& set, const SparseScene& sparse, io::SetWriter& writer
     progress.Note(fmt::format(
         "depth is not completed where none was measured: that takes `memory` {:.3f} (GB)",
         bytes / kBytesPerGigabyte));
-    return;
+    return {};
   }
   const auto far_z = static_cast<float>(kFarthest * farthest);
   std::vector<stereo::CellView> cells(sources.size());
@@ -116,11 +117,13 @@ void CompleteDepth(DtrSet& set, const SparseScene& sparse, io::SetWriter& writer
   });
   if (!measured) {
     progress.Note("depth is not completed: none was measured");
-    return;
+    return {};
   }
   const auto neighbours =
       NeighboursOf(views, sources, SourceScene(sparse, views, sources), kNeighbours);
-  const auto completed = stereo::CompleteCells(cells, neighbours, threads, progress);
+  const std::vector<stereo::ScenePlane> planes =
+      known.depth ? known.planes : stereo::PlanesToChoose(cells, neighbours, threads);
+  const auto completed = stereo::CompleteCells(cells, neighbours, planes, threads, progress);
   progress.Stage("completed depth", count);
   for (int i = 0; i < count; ++i) {
     progress.ThrowIfInterrupted();
@@ -131,6 +134,7 @@ void CompleteDepth(DtrSet& set, const SparseScene& sparse, io::SetWriter& writer
     writer.WriteCompleted(depth, views[v]);
     progress.Update(i + 1);
   }
+  return planes;
 }
 
 }  // namespace dtr::pipeline

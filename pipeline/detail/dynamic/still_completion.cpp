@@ -29,8 +29,8 @@ StillCompletion::StillCompletion(BackgroundViews backgrounds, const SparseScene&
                                  const std::vector<View>& views, io::SetWriter& writer, int threads,
                                  double memory_gb, Progress& progress)
     : backgrounds_(std::move(backgrounds)), writer_(writer) {
-  CompleteDepth(backgrounds_.set, SourceScene(points, views, SourceIndices(views)), writer, threads,
-                memory_gb, progress);
+  planes_ = CompleteDepth(backgrounds_.set, SourceScene(points, views, SourceIndices(views)),
+                          writer, threads, memory_gb, progress);
 }
 
 KnownCompletion StillCompletion::Of(const std::vector<View>& views) const {
@@ -42,7 +42,8 @@ KnownCompletion StillCompletion::Of(const std::vector<View>& views) const {
           },
           [&views, &behind](size_t view) {
             return std::min(views[view].near_z, behind[PositionOf(view, views)].completed_near_z);
-          }};
+          },
+          planes_};
 }
 
 DepthImage StillCompletion::Known(size_t source, const View& loaded) const {

@@ -29,6 +29,7 @@ class StillCompletion {
 
   BackgroundViews backgrounds_;
   io::SetWriter& writer_;
+  std::vector<stereo::ScenePlane> planes_;
 };
 
 }  // namespace dtr::pipeline

@@ -9,6 +9,7 @@
 #include "dtr/io/set_io.h"
 #include "dtr/types/dtr_set.h"
 #include "dtr/types/sparse_scene.h"
+#include "stereo/complete/scene_planes.h"
 
 namespace dtr::pipeline {
 
@@ -31,15 +32,19 @@ struct KnownCompletion {
   /// The near end of the range that the view's completed depth is stored in; what is found nearer
   /// is put there.
   std::function<double(size_t view)> near_z;
+  /// The planes of the scene, as CompleteDepth found them before.
+  std::vector<stereo::ScenePlane> planes;
 };
 
 /// Completes the depth of every source view (stereo/complete): what was not measured gets the
 /// depth of a surface or is far. After FinishScene: pixels of disparity need the baselines. Where
 /// `memory_gb` is too little, or nothing was measured at all, a note says so and depth stays as it
 /// is. `sparse`: views are indices into the set's. What is `known` stays as it is, and the rest is
-/// completed as if it had been measured.
-void CompleteDepth(DtrSet& set, const SparseScene& sparse, io::SetWriter& writer, int threads,
-                   double memory_gb, Progress& progress, const KnownCompletion& known = {});
+/// completed as if it had been measured. Returns the planes of the scene that cells chose among.
+std::vector<stereo::ScenePlane> CompleteDepth(DtrSet& set, const SparseScene& sparse,
+                                              io::SetWriter& writer, int threads, double memory_gb,
+                                              Progress& progress,
+                                              const KnownCompletion& known = {});
 
 /// How much of the source views has a measured depth.
 struct DepthCount {
