@@ -1,8 +1,6 @@
 #include "calib/bundle/plain/iterative.h"
 
 #include <Eigen/Cholesky>
-#include <algorithm>
-#include <utility>
 #include <vector>
 
 #include "calib/solve/conjugate_gradients.h"
@@ -39,43 +37,32 @@ class SchurComplement {
     return y;
   }
 
-  /// Prepares Precondition; false where a block is not positive definite.
+  /// Inverts every node's own block; false where one is not positive definite.
   bool Invert() {
     std::vector<Eigen::MatrixXd> own;
     for (size_t node = 0; node < layout_.nodes(); ++node) own.push_back(OwnBlock(node));
-    with_lens_.resize(problem_.images());
-    for (size_t image = 0; image < problem_.images(); ++image) {
-      if (MovesLensOf(image)) with_lens_[image] = BlockWithLens(image);
+    for (size_t i = 0; i < problem_.seen().size(); ++i) {
+      const auto image = static_cast<size_t>(problem_.seen()[i].image);
+      const CameraMap cross(normal_.CameraCross(i));
+      own[image].noalias() -= cross * cross.transpose();
+      const double* const lens_cross = normal_.LensCross(i);
+      if (lens_cross == nullptr) continue;
+      const size_t node = layout_.LensNode(problem_.LensOf(image));
+      const auto of_lens = LensMap(lens_cross).topRows(layout_.size(node));
+      own[node].noalias() -= of_lens * of_lens.transpose();
     }
-    SubtractPoints(own);
     for (const Eigen::MatrixXd& block : own) {
       inverse_.emplace_back(block);
       if (block.size() > 0 && inverse_.back().info() != Eigen::Success) return false;
     }
-    EliminateImages(own);
     return true;
   }
 
-  /// Of every lens with its images, the system without what connects images with each other: all
-  /// of them depend on the lens, so that steps along it would take many iterations otherwise. Only
-  /// the lens' own block and the images' where that is not positive definite.
   VectorXd Precondition(const VectorXd& x) const {
-    VectorXd y(x.size()), of_lenses = x;
-    for (size_t image = 0; image < problem_.images(); ++image) {
-      if (!IsEliminated(image)) continue;
-      const size_t lens = layout_.LensNode(problem_.LensOf(image));
-      of_lenses.segment(layout_.offset(lens), layout_.size(lens)).noalias() -=
-          solved_[image].transpose() * x.segment(layout_.offset(image), layout_.size(image));
-    }
+    VectorXd y(x.size());
     for (size_t node = 0; node < layout_.nodes(); ++node) {
       const long at = layout_.offset(node), size = layout_.size(node);
-      if (size > 0) y.segment(at, size) = inverse_[node].solve(of_lenses.segment(at, size));
-    }
-    for (size_t image = 0; image < problem_.images(); ++image) {
-      if (!IsEliminated(image)) continue;
-      const size_t lens = layout_.LensNode(problem_.LensOf(image));
-      y.segment(layout_.offset(image), layout_.size(image)).noalias() -=
-          solved_[image] * y.segment(layout_.offset(lens), layout_.size(lens));
+      if (size > 0) y.segment(at, size) = inverse_[node].solve(x.segment(at, size));
     }
     return y;
   }
@@ -84,75 +71,6 @@ class SchurComplement {
   using CameraMap = Eigen::Map<const Eigen::Matrix<double, kCamera, 3>>;
   using LensMap = Eigen::Map<const Eigen::Matrix<double, kMaxFree, 3>>;
   using BlockMap = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;  // transposed
-
-  bool MovesLensOf(size_t image) const {
-    return layout_.size(layout_.LensNode(problem_.LensOf(image))) > 0;
-  }
-  bool IsEliminated(size_t image) const { return !solved_.empty() && solved_[image].size() > 0; }
-
-  Eigen::MatrixXd BlockWithLens(size_t image) const {
-    const size_t lens = layout_.LensNode(problem_.LensOf(image));
-    const BlockMap block =
-        Transposed({static_cast<std::uint32_t>(image), static_cast<std::uint32_t>(lens),
-                    layout_.Begin(image, lens)});
-    return block.transpose();
-  }
-
-  // Takes what points contribute off the nodes' own blocks and those of images with their lenses.
-  void SubtractPoints(std::vector<Eigen::MatrixXd>& own) {
-    std::vector<std::pair<size_t, Eigen::Matrix<double, Eigen::Dynamic, 3>>> lenses;
-    const auto of = [&](size_t node) {
-      return std::find_if(lenses.begin(), lenses.end(),
-                          [&](const auto& lens) { return lens.first == node; });
-    };
-    for (size_t p = 0; p < problem_.points(); ++p) {
-      lenses.clear();
-      for (size_t i = problem_.first(p); i < problem_.first(p + 1); ++i) {
-        const double* const cross = normal_.LensCross(i);
-        if (cross == nullptr) continue;
-        const size_t node =
-            layout_.LensNode(problem_.LensOf(static_cast<size_t>(problem_.seen()[i].image)));
-        const auto of_lens = LensMap(cross).topRows(layout_.size(node));
-        if (const auto found = of(node); found != lenses.end()) {
-          found->second += of_lens;
-        } else {
-          lenses.emplace_back(node, of_lens);
-        }
-      }
-      for (const auto& [node, sum] : lenses) own[node].noalias() -= sum * sum.transpose();
-      for (size_t i = problem_.first(p); i < problem_.first(p + 1); ++i) {
-        const auto image = static_cast<size_t>(problem_.seen()[i].image);
-        const CameraMap cross(normal_.CameraCross(i));
-        own[image].noalias() -= cross * cross.transpose();
-        const auto lens = of(layout_.LensNode(problem_.LensOf(image)));
-        if (lens != lenses.end()) {
-          with_lens_[image].noalias() -= cross * lens->second.transpose();
-        }
-      }
-    }
-  }
-
-  // Leaves each lens with what its images leave of it, where that is positive definite.
-  void EliminateImages(const std::vector<Eigen::MatrixXd>& own) {
-    std::vector<Eigen::MatrixXd> left = own;
-    solved_.resize(problem_.images());
-    for (size_t image = 0; image < problem_.images(); ++image) {
-      if (!MovesLensOf(image)) continue;
-      solved_[image] = inverse_[image].solve(with_lens_[image]);
-      left[layout_.LensNode(problem_.LensOf(image))].noalias() -=
-          with_lens_[image].transpose() * solved_[image];
-    }
-    std::vector<bool> fits(layout_.nodes(), true);
-    for (size_t node = problem_.images(); node < layout_.nodes(); ++node) {
-      if (left[node].size() == 0) continue;
-      Eigen::LLT<Eigen::MatrixXd> inverse(left[node]);
-      fits[node] = inverse.info() == Eigen::Success;
-      if (fits[node]) inverse_[node] = std::move(inverse);
-    }
-    for (size_t image = 0; image < problem_.images(); ++image) {
-      if (!fits[layout_.LensNode(problem_.LensOf(image))]) solved_[image].resize(0, 0);
-    }
-  }
 
   // Adds A A^T x over the nodes of a point.
   void AddPoint(size_t point, const VectorXd& x, VectorXd& sum) const {
@@ -207,8 +125,6 @@ class SchurComplement {
   const int threads_;
   std::vector<VectorXd> sums_;
   std::vector<Eigen::LLT<Eigen::MatrixXd>> inverse_;
-  std::vector<Eigen::MatrixXd> with_lens_;  // per image, its block with its lens
-  std::vector<Eigen::MatrixXd> solved_;     // the same, with the inverse of the image's own
 };
 
 template <int kCamera>
