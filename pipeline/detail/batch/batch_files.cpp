@@ -59,7 +59,9 @@ Batch FromJson(const Json& json) {
     read.name = stage.at("stage").get<std::string>();
     read.parts = stage.at("parts").get<int>();
     read.is_last = read.name == kLastStage;
-    if (read.parts < 1 || read.parts > kMaxParts) throw Error("a number of parts that cannot be");
+    if (read.parts < 1 || read.parts > kMaxParts) {
+      throw std::out_of_range("a number of parts that cannot be");
+    }
   }
   batch.local = json.at("local").get<int>();
   batch.threads = json.at("threads").get<int>();
