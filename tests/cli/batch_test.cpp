@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <fstream>
+
 #include "dtr/base/durable.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/cli/small_courtyard.h"
@@ -186,6 +188,23 @@ TEST_F(Batch, WordsThatCannotBeMeantAreRejectedBeforeAnyWork) {
   EXPECT_EQ(dry.code, 0);
   EXPECT_NE((dry.out + dry.err).find("matching: "), std::string::npos);
   EXPECT_TRUE(fs::is_empty(folder_ / "a"));
+}
+
+TEST_F(Batch, ADamagedRecordIsOneLine) {
+  ASSERT_NE(RunBatch("a", {"--local", "2", "--array-size", "2"},
+                     {SIGTERM, [&] { return fs::exists(Set("a").string() + ".partial"); }})
+                .code,
+            0);
+  const fs::path record = Set("a").string() + ".batch/batch.json";
+  const std::string whole = Text(record);
+  const size_t parts = whole.find("\"parts\": 1");
+  ASSERT_NE(parts, std::string::npos);
+  for (const std::string& damaged : {whole.substr(0, whole.size() / 2), std::string("[]"),
+                                     std::string(whole).replace(parts, 10, "\"parts\": -1")}) {
+    std::ofstream(record) << damaged;
+    ExpectRejected(Dtr({"batch", "status", Set("a").string()}), 1,
+                   "expected what dtr batch writes, found something else");
+  }
 }
 
 TEST_F(Batch, AnotherBatchOfTheSameSetIsNotReplaced) {

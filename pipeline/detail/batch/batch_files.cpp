@@ -4,6 +4,7 @@
 
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -103,9 +104,10 @@ Batch LoadBatch(const fs::path& set) {
   if (!HasBatch(set)) {
     throw Error(file.string() + ": expected a batch of that set, found none; dtr batch begins one");
   }
+  const std::string text = ReadFile(file, kLargestFileBytes);
   try {
-    return FromJson(Json::parse(ReadFile(file, kLargestFileBytes)));
-  } catch (const Json::exception& error) {
+    return FromJson(Json::parse(text));
+  } catch (const std::exception& error) {
     throw Error(
         fmt::format("{}: expected what dtr batch writes, found something else ({}); delete "
                     "the folder and begin the batch again, what was built stays",
