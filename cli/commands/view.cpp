@@ -149,6 +149,8 @@ Json StateJson(const viewer::AppState& state) {
           {"time_step", state.time_step},
           {"time_steps", state.time_steps},
           {"playing_time", state.playing_time},
+          {"time_speed", state.time_speed},
+          {"loops_time", state.loops_time},
           {"controls", ControlsJson(state.controls)},
           {"message", state.message},
           {"render_options", RenderOptionArguments(state.render, WholeFrames())}};

@@ -197,6 +197,18 @@ std::vector<Controls::Row> Controls::WhereRows() {
       {"later", [this] { ClickUntilItIs("later", "time_step", 2); }},
       {"earlier", [this] { ClickUntilItIs("earlier", "time_step", 1); }},
       {"play", [this] { ExpectPlays([this] { Click("play"); }); }},
+      {"loop",
+       [this] {
+         ClickUntilItIs("loop", "loops_time", false);
+         ClickUntilItIs("loop", "loops_time", true);
+       }},
+      {"speed",
+       [this] {
+         Click("speed", 0.2);
+         Look("a lower speed", [](const Json& s) { return s["time_speed"].get<double>() < 1; });
+         Click("speed", 0.8);
+         Look("a higher speed", [](const Json& s) { return s["time_speed"].get<double>() > 1; });
+       }},
   };
 }
 

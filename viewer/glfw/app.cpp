@@ -447,6 +447,8 @@ class App {
     state.reloads = reloads_;
     state.controls = controls_;
     state.playing_time = time_.playing();
+    state.time_speed = time_.speed;
+    state.loops_time = time_.loop;
     state.message = message_;
     state.render = options_;
     return state;

@@ -85,6 +85,8 @@ struct AppState {
   int reloads = 0;                        ///< how often the set was read again
   size_t time_step = 0, time_steps = 1;   ///< of a dynamic set: the frame shown, of how many
   bool playing_time = false;              ///< one time step after the other
+  double time_speed = 1;                  ///< seconds of a dynamic set that are played in a second
+  bool loops_time = true;                 ///< played again after its last time step
   bool recording = false;
   bool asks_for_path = false;          ///< a window asks for a file
   std::vector<ControlPlace> controls;  ///< of the panel, from top to bottom
