@@ -124,7 +124,8 @@ std::vector<std::string> FailedOf(const Batch& batch, const std::vector<QueuedPa
 }
 
 BatchState StateOf(const Batch& batch) {
-  const auto queued = QueuedParts(batch);
+  const bool is_finished = MissingParts(batch, batch.stages.back()).empty();
+  const auto queued = is_finished ? std::vector<QueuedPart>() : QueuedParts(batch);
   BatchState state;
   state.set = batch.set;
   for (const BatchStage& stage : batch.stages) {
@@ -163,9 +164,13 @@ std::string ToJson(const BatchState& state) {
 BatchState RunBatch(const BatchOptions& options, const std::function<void(const std::string&)>& say,
                     Progress& progress) {
   Batch batch = Planned(options);
-  if (HasBatch(batch.set)) {
-    KeepParts(LoadBatch(batch.set), batch);
-    RequireNoneUnderWay(batch);
+  std::optional<Batch> before;
+  if (HasBatch(batch.set)) before = LoadBatch(batch.set);
+  const bool was_finished = before && MissingParts(*before, before->stages.back()).empty();
+  if (was_finished && options.resumes) return StateOf(*before);
+  if (before && !was_finished) RequireNoneUnderWay(*before);
+  if (before && !was_finished && fs::exists(io::SetWriter::WorkFolderOf(batch.set))) {
+    KeepParts(*before, batch);
   } else {
     io::SetWriter::RequireTarget(options.build.output, options.build.force);
   }
@@ -196,6 +201,7 @@ BatchOptions ReadBatch(const fs::path& set) {
   options.local = batch.local;
   options.threads = batch.threads;
   options.slurm = batch.slurm;
+  options.resumes = true;
   return options;
 }
 
@@ -204,7 +210,7 @@ BatchState StateOfBatch(const fs::path& set) { return StateOf(LoadBatch(set)); }
 int CancelBatch(const fs::path& set) {
   const Batch batch = LoadBatch(set);
   const auto queued = QueuedParts(batch);
-  if (!queued.empty()) CancelJobs(batch);
+  CancelJobs(queued);
   return static_cast<int>(queued.size());
 }
 

@@ -28,6 +28,7 @@ struct BatchOptions {
   int local = 0;                    ///< so many processes here; 0: Slurm
   SlurmOptions slurm;
   int threads = 0;       ///< of all local processes together; 0: all cores
+  bool resumes = false;  ///< of a batch that is finished nothing is begun again
   bool dry_run = false;  ///< says what would be done, and touches nothing
 };
 

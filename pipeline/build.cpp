@@ -262,8 +262,10 @@ void AddParts(const std::filesystem::path& work, const std::vector<std::string>&
 CalibratedPhotos CamerasOf(const capture::Capture& photos, const CalibrateOptions& calibrate,
                            const BuildShare& share, const std::filesystem::path& work,
                            Progress& progress) {
-  if (share.is_shared() && !calibrate.part) return FrozenCalibration(work);
+  const bool is_later = share.is_shared() && !calibrate.part;
+  if (is_later || share.Is("ranges")) return FrozenCalibration(work);
   CalibratedPhotos calibrated = CalibratePhotos(photos, calibrate, work / "calibration", progress);
+  if (calibrate.part) throw PartDone();  // given cameras with their points need none of it
   if (share.Is("calibration")) FreezeCalibration(calibrated, work);
   share.EndAfter("calibration");
   return calibrated;

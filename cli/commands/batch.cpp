@@ -67,6 +67,8 @@ void ReadBuildWords(const std::vector<std::string>& words, const CommonOptions& 
   CLI::App build("dtr build");
   BuildArguments arguments;
   AddBuildOptions(build, arguments);
+  CommonOptions all = common;
+  build.add_option("--seed", all.seed);  // among the words of a batch that is resumed
   std::vector<std::string> backwards(words.rbegin(), words.rend());
   try {
     build.parse(backwards);
@@ -80,7 +82,7 @@ void ReadBuildWords(const std::vector<std::string>& words, const CommonOptions& 
     throw UsageError(
         "batch: time steps of a dynamic set follow each other and are one job; use dtr build");
   }
-  FinishBuildArguments(common, arguments);
+  FinishBuildArguments(all, arguments);
   options.build = arguments.options;
   options.words = words;
   if (common.seed != 0) {
@@ -134,7 +136,13 @@ void AddResumeCommand(CLI::App& batch) {
                  if (given.local > 0) options.local = given.local;
                  if (asked->slurm) {
                    options.local = 0;
-                   options.slurm = given.slurm;
+                   const pipeline::SlurmOptions& asked_for = given.slurm;
+                   if (!asked_for.partition.empty()) options.slurm.partition = asked_for.partition;
+                   if (!asked_for.account.empty()) options.slurm.account = asked_for.account;
+                   if (!asked_for.time.empty()) options.slurm.time = asked_for.time;
+                   if (asked_for.cpus_per_task > 0) {
+                     options.slurm.cpus_per_task = asked_for.cpus_per_task;
+                   }
                  }
                  options.dry_run = given.dry_run;
                  if (context.common.threads > 0) options.threads = context.common.threads;

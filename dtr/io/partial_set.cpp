@@ -54,7 +54,8 @@ bool HoldsWork(const fs::path& partial) {
   for (const auto& entry : fs::recursive_directory_iterator(partial)) {
     const fs::path inside = entry.path().lexically_relative(partial);
     if (entry.is_directory() || IsTemporaryFile(inside)) continue;
-    if (inside != kFingerprint && inside != kLock) return true;
+    const bool is_lock = inside == kLock || inside.extension() == ".lock";
+    if (inside != kFingerprint && !is_lock) return true;
   }
   return false;
 }

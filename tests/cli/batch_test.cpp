@@ -76,6 +76,37 @@ TEST_F(Batch, ProcessesHereGiveTheBytesOfABuild) {
   EXPECT_FALSE(fs::exists(Set("batch").string() + ".partial"));
   const Ran status = DtrOk({"batch", "status", Set("batch").string(), "--json", "-"});
   EXPECT_NE(status.out.find("\"finished\": true"), std::string::npos) << status.out;
+  const Ran again = DtrByItself({"batch", "resume", Set("batch").string()});
+  EXPECT_EQ(again.code, 0) << again.err;
+  EXPECT_FALSE(fs::exists(Set("batch").string() + ".partial")) << "nothing is begun again";
+}
+
+TEST_F(Batch, CamerasWithTheirPointsNeedNoStagesOfStructureFromMotion) {
+  const auto words = [&](const std::string& command, const std::string& run,
+                         const std::vector<std::string>& more) {
+    const fs::path courtyard = folder_ / "courtyard";
+    std::vector<std::string> all = {command,    (courtyard / "images").string(),
+                                    "--poses",  (courtyard / "sparse").string(),
+                                    "--preset", "fast",
+                                    "-o",       Set(run).string()};
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  };
+  DtrOk(words("build", "plain", {}));
+  DtrOk(words("build", "batch", {"--stage", "capture"}));
+  EXPECT_FALSE(fs::exists(Set("batch"))) << "one stage is no build";
+  const Ran ran = DtrByItself(words("batch", "batch", {"--local", "2", "--array-size", "2"}));
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(DifferingFiles(Contents(Set("plain")), Contents(Set("batch"))), ::testing::IsEmpty());
+}
+
+TEST_F(Batch, ASeedIsAmongTheWordsThatAreResumed) {
+  ASSERT_NE(RunBatch("a", {"--local", "2", "--array-size", "2", "--seed", "5"},
+                     {SIGTERM, [&] { return fs::exists(Set("a").string() + ".partial"); }})
+                .code,
+            0);
+  const Ran dry = DtrByItself({"batch", "resume", Set("a").string(), "--dry-run"});
+  EXPECT_EQ(dry.code, 0) << dry.err;
 }
 
 TEST_F(Batch, ForcedTheNewSetTakesThePlaceOfTheOld) {
@@ -114,6 +145,8 @@ TEST_F(Batch, AFailedPartIsNamedWithWhatItSaid) {
             std::string::npos)
       << ran.err;
   EXPECT_NE(ran.err.find("0001.jpg: cannot be read"), std::string::npos) << ran.err;
+  const fs::path work = Set("batch").string() + ".partial/work";
+  EXPECT_FALSE(fs::exists(work / "calibration/conventions")) << "no part of a test of cameras";
 }
 
 TEST_F(Batch, AStageWhoseInputsNobodyMadeNamesTheStageThatDoes) {
@@ -190,6 +223,11 @@ TEST_F(Batch, WordsThatCannotBeMeantAreRejectedBeforeAnyWork) {
   EXPECT_TRUE(fs::is_empty(folder_ / "a"));
 }
 
+std::string WithoutStages(std::string record) {
+  const size_t begin = record.find("\"stages\": [") + 11, end = record.find("\"local\"");
+  return record.replace(begin, end - begin, "], ");
+}
+
 TEST_F(Batch, ADamagedRecordIsOneLine) {
   ASSERT_NE(RunBatch("a", {"--local", "2", "--array-size", "2"},
                      {SIGTERM, [&] { return fs::exists(Set("a").string() + ".partial"); }})
@@ -199,8 +237,9 @@ TEST_F(Batch, ADamagedRecordIsOneLine) {
   const std::string whole = Text(record);
   const size_t parts = whole.find("\"parts\": 1");
   ASSERT_NE(parts, std::string::npos);
-  for (const std::string& damaged : {whole.substr(0, whole.size() / 2), std::string("[]"),
-                                     std::string(whole).replace(parts, 10, "\"parts\": -1")}) {
+  for (const std::string& damaged :
+       {whole.substr(0, whole.size() / 2), std::string("[]"), WithoutStages(whole),
+        std::string(whole).replace(parts, 10, "\"parts\": -1")}) {
     std::ofstream(record) << damaged;
     ExpectRejected(Dtr({"batch", "status", Set("a").string()}), 1,
                    "expected what dtr batch writes, found something else");

@@ -58,6 +58,12 @@ TEST_F(PlaneFilesTest, ThoseOfAnotherCalibrationAreNotTaken) {
   EXPECT_FALSE(PlaneFiles(folder_, kMadeFrom).Has(1, 4));
 }
 
+TEST_F(PlaneFilesTest, ThoseOfOtherCamerasStayWhereProcessesShareTheFolder) {
+  PlaneFiles(folder_, kMadeFrom).Save(1, 4, Planes());
+  EXPECT_THROW(PlaneFiles(folder_, "others", true), Error);
+  EXPECT_TRUE(PlaneFiles(folder_, kMadeFrom, true).Has(1, 4));
+}
+
 TEST_F(PlaneFilesTest, RejectsEveryTruncatedOrDamagedFile) {
   PlaneFiles files(folder_, kMadeFrom);
   files.Save(0, 0, Planes());

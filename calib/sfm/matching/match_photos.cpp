@@ -169,7 +169,8 @@ PairJournal JournalOf(std::span<const MatchPhoto> photos, const MatchOptions& op
   if (options.journal.empty()) return {};
   std::vector<size_t> counts;
   for (const MatchPhoto& photo : photos) counts.push_back(photo.features.keypoints.size());
-  return {options.journal, options.journal_inputs, counts, NameOf(options.part)};
+  const bool is_matching = options.part && options.part->stage == MatchPart::Stage::kMatching;
+  return {options.journal, options.journal_inputs, counts, NameOf(options.part), !is_matching};
 }
 
 }  // namespace

@@ -174,12 +174,14 @@ std::vector<fs::path> PartsOf(const fs::path& file) {
 }  // namespace
 
 PairJournal::PairJournal(const fs::path& file, const std::string& inputs,
-                         std::span<const size_t> features, const std::string& part) {
+                         std::span<const size_t> features, const std::string& part,
+                         bool reads_parts) {
   file_ = part.empty() ? file : fs::path(file.string() + "." + part);
   // The file first: without its pairs the parts' records mean nothing.
   std::uint64_t whole = Read(file, inputs, features);
   if (!part.empty()) whole = 0;
   for (const fs::path& other : PartsOf(file)) {
+    if (other != file_ && !reads_parts) continue;
     const std::uint64_t read = Read(other, inputs, features);
     if (other == file_) whole = read;
   }

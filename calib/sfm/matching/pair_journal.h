@@ -38,8 +38,10 @@ class PairJournal {
   /// over what `file` and those of its parts hold of the same inputs, as far as each is whole.
   /// `part`: the name of the part that is written; empty: `file` is. Anything else in what is
   /// written is dropped. Throws Error where it cannot be written.
+  /// Without `reads_parts` other parts, which may be large, stay unread.
   PairJournal(const std::filesystem::path& file, const std::string& inputs,
-              std::span<const size_t> features, const std::string& part = "");
+              std::span<const size_t> features, const std::string& part = "",
+              bool reads_parts = true);
 
   /// Removes the file and those of its parts. Throws Error.
   static void Remove(const std::filesystem::path& file);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -48,8 +49,12 @@ Json ToJson(const Batch& batch) {
           {"jobs", jobs}};
 }
 
+void Require(bool holds, const char* found) {
+  if (!holds) throw std::out_of_range(found);
+}
+
 Batch FromJson(const Json& json) {
-  constexpr int kMaxParts = 1 << 20;
+  constexpr int kMaxParts = 1 << 20, kMaxProcesses = 1024;
   Batch batch;
   batch.set = json.at("set").get<std::string>();
   batch.program = json.at("program").get<std::string>();
@@ -60,20 +65,29 @@ Batch FromJson(const Json& json) {
     read.name = stage.at("stage").get<std::string>();
     read.parts = stage.at("parts").get<int>();
     read.is_last = read.name == kLastStage;
-    if (read.parts < 1 || read.parts > kMaxParts) {
-      throw std::out_of_range("a number of parts that cannot be");
-    }
+    Require(read.parts >= 1 && read.parts <= kMaxParts, "a number of parts that cannot be");
+    Require(!read.name.empty() && read.name.find_first_not_of("abcdefghijklmnopqrstuvwxyz"
+                                                              "0123456789-") == std::string::npos,
+            "a stage that is none");
   }
+  Require(!batch.stages.empty() && batch.stages.back().is_last, "no last stage");
   batch.local = json.at("local").get<int>();
+  Require(batch.local >= 0 && batch.local <= kMaxProcesses, "a number of processes that cannot be");
   batch.threads = json.at("threads").get<int>();
   batch.memory_gb = json.at("memory_gb").get<double>();
   batch.replaced = json.at("replaced").get<std::int64_t>();
   const Json& slurm = json.at("slurm");
   batch.slurm = {slurm.at("partition").get<std::string>(), slurm.at("account").get<std::string>(),
                  slurm.at("time").get<std::string>(), slurm.at("cpus_per_task").get<int>()};
+  const auto fits = [](int number) { return number >= 0 && number < kMaxParts; };
   for (const Json& jobs : json.at("jobs")) {
-    batch.jobs.push_back({jobs.at("id").get<std::string>(), jobs.at("stage").get<std::string>(),
-                          jobs.at("offset").get<int>(), jobs.at("parts").get<std::vector<int>>()});
+    BatchJobs& read = batch.jobs.emplace_back();
+    read.id = jobs.at("id").get<std::string>();
+    read.stage = jobs.at("stage").get<std::string>();
+    read.offset = jobs.at("offset").get<int>();
+    read.parts = jobs.at("parts").get<std::vector<int>>();
+    Require(fits(read.offset) && std::all_of(read.parts.begin(), read.parts.end(), fits),
+            "jobs that cannot be");
   }
   return batch;
 }

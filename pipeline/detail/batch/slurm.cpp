@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <map>
@@ -86,8 +87,7 @@ std::string ScriptOf(const Batch& batch, const BatchStage& stage, int offset) {
   if (is_array) {
     command += fmt::format("--part \"$((SLURM_ARRAY_TASK_ID + {}))/{}\" ", offset, stage.parts);
   }
-  return fmt::format("#!/bin/sh\n# {} of {}\nexec {}--threads \"${{SLURM_CPUS_PER_TASK:-1}}\"\n",
-                     stage.name, batch.set.string(), command);
+  return fmt::format("#!/bin/sh\nexec {}--threads \"${{SLURM_CPUS_PER_TASK:-1}}\"\n", command);
 }
 
 // What a process takes beside what `memory` counts, and what Slurm is asked for.
@@ -180,23 +180,28 @@ std::vector<QueuedPart> QueuedParts(const Batch& batch) {
   if (batch.jobs.empty()) return queued;
   std::map<std::string, const BatchJobs*> jobs;
   for (const BatchJobs& one : batch.jobs) jobs[one.id] = &one;
-  for (const std::string& line : Ask({"squeue", "--noheader", "--array", "--format=%F %K %T"})) {
+  const std::string folder = BatchFolder(batch.set).string() + "/";
+  for (const std::string& line : Ask({"squeue", "--noheader", "--array", "--format=%F %K %T %o"})) {
     char id[32] = "", index[32] = "", state[32] = "";
-    if (std::sscanf(line.c_str(), " %31s %31s %31s", id, index, state) != 3) continue;
+    int used = 0;
+    if (std::sscanf(line.c_str(), " %31s %31s %31s %n", id, index, state, &used) != 3) continue;
     const auto found = jobs.find(id);
-    if (found == jobs.end()) continue;
+    const bool is_ours = line.substr(static_cast<size_t>(used)).starts_with(folder);
+    if (found == jobs.end() || !is_ours) continue;
     int number = 0;
     const bool is_array = std::sscanf(index, "%d", &number) == 1;
-    queued.push_back({found->second->stage, is_array ? number - 1 + found->second->offset : 0,
+    queued.push_back({id, found->second->stage, is_array ? number - 1 + found->second->offset : 0,
                       std::string(state) != "PENDING"});
   }
   return queued;
 }
 
-void CancelJobs(const Batch& batch) {
+void CancelJobs(const std::vector<QueuedPart>& parts) {
+  std::set<std::string> ids;
+  for (const QueuedPart& part : parts) ids.insert(part.id);
   std::vector<std::string> argv = {"scancel"};
-  for (const BatchJobs& jobs : batch.jobs) argv.push_back(jobs.id);
-  if (argv.size() > 1) Ask(argv);
+  argv.insert(argv.end(), ids.begin(), ids.end());
+  if (!ids.empty()) Ask(argv);
 }
 
 }  // namespace dtr::pipeline

@@ -18,14 +18,15 @@ void SubmitToSlurm(Batch& batch, bool dry_run, const std::function<void(const st
 
 /// A part that Slurm has in its queue.
 struct QueuedPart {
-  std::string stage;
+  std::string id, stage;
   int part = 0;
   bool is_running = false;
 };
-/// Of the batch. Throws Error where Slurm does not answer.
+/// Of the batch, known by their scripts: numbers may be of other jobs, too. Throws Error where
+/// Slurm does not answer.
 std::vector<QueuedPart> QueuedParts(const Batch& batch);
 
-/// Ends the batch's jobs. Throws Error where Slurm rejects.
-void CancelJobs(const Batch& batch);
+/// Ends the jobs of these. Throws Error where Slurm rejects.
+void CancelJobs(const std::vector<QueuedPart>& parts);
 
 }  // namespace dtr::pipeline

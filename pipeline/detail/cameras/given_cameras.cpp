@@ -77,6 +77,7 @@ TriangulatedCameras TriangulateAndTest(const GivenPhotos& given, Progress& progr
   } catch (const UsageError&) {
     throw;
   } catch (const Error& error) {
+    if (given.sfm.part) throw;  // what a part lacks says nothing of the cameras
     const calib::ConventionReport report = TestAlone(given, images, progress);
     if (report.found.empty()) throw;
     throw Error(std::string(error.what()) + "; " + calib::LineOf(report, given.file));

@@ -197,7 +197,8 @@ void KeepRanges(const RangeInputs& in, const std::function<bool(int)>& is_done, 
 // Processes that share the work have folders of their own for what they throw away.
 std::string EstimatesOf(const std::optional<DepthStagePart>& part) {
   if (!part) return "estimates";
-  return fmt::format("estimates_{}_of_{}", part->depth.part.index, part->depth.part.count);
+  const auto& [pass, share] = part->depth;
+  return fmt::format("estimates_{}_{}_of_{}", pass, share.index, share.count);
 }
 
 }  // namespace
@@ -274,7 +275,7 @@ DepthStageResult DepthStage(DtrSet& set, const SparseScene& sparse, const DepthC
   // The other half holds photos, and maps that wait for their neighbours to be done.
   depth_options.engine.memory_gb = choice.memory_gb.value_or(kDefaultMemoryGb) / 2;
   const std::string made_from = HashOf(sources.stereo, scene);
-  PlaneFiles planes(work / "planes", made_from);
+  PlaneFiles planes(work / "planes", made_from, options.part && !options.part->ranges_alone);
   const NormalFiles normals(work, options.normals);
   const auto is_done = [&](int source) {
     const View& view = view_of(source);

@@ -48,9 +48,15 @@ bool Reads(const fs::path& file, const std::string& text) {
 
 }  // namespace
 
-PlaneFiles::PlaneFiles(const fs::path& folder, const std::string& made_from) : folder_(folder) {
+PlaneFiles::PlaneFiles(const fs::path& folder, const std::string& made_from, bool is_shared)
+    : folder_(folder) {
   const fs::path origin = folder / "made_from";
   if (Exists(origin) && Reads(origin, made_from)) return;
+  if (is_shared) {
+    throw Error(folder.string() +
+                ": expected planes of the frozen cameras, found none or others; dtr build without "
+                "a stage finds depth anew");
+  }
   Remove(folder);
   MakeFolder(folder);
   WriteFileAtomically(origin, made_from);

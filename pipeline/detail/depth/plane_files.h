@@ -19,8 +19,9 @@ namespace dtr::pipeline {
 class PlaneFiles final : public stereo::PlaneMapStore {
  public:
   /// Creates the folder. `made_from`: one line that says what the planes are computed from; planes
-  /// of anything else are removed.
-  PlaneFiles(const std::filesystem::path& folder, const std::string& made_from);
+  /// of anything else are removed or, where other processes share the folder, rejected with Error.
+  PlaneFiles(const std::filesystem::path& folder, const std::string& made_from,
+             bool is_shared = false);
   bool Has(int round, int view) const override;
   std::shared_ptr<const stereo::PlaneMap> Load(int round, int view) override;
   void Save(int round, int view, stereo::PlaneMap&& map) override;

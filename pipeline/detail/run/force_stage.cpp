@@ -46,15 +46,16 @@ void ForgetStage(const fs::path& folder, const std::string& name) {
     throw UsageError(
         fmt::format("`force_stage` {}: expected one of {}", name, fmt::join(StagesKept(), ", ")));
   }
-  // Later stages first: should this be cut off, what is left is the work of an earlier moment.
+  // Records of parts, and the cameras frozen for them, would speak of what is gone; then later
+  // stages first: should this be cut off, what is left is the work of an earlier moment.
+  const auto remove = [&](const std::string& path) {
+    std::error_code error;
+    fs::remove_all(folder / path, error);
+    if (error) throw Error((folder / path).string() + ": cannot be removed: " + error.message());
+  };
+  for (const char* of_parts : {"work/parts", "work/frozen_cameras"}) remove(of_parts);
   for (auto kept = all.end(); kept-- != from;) {
-    for (const std::string& path : kept->paths) {
-      std::error_code error;
-      fs::remove_all(folder / path, error);
-      if (error) {
-        throw Error((folder / path).string() + ": cannot be removed: " + error.message());
-      }
-    }
+    for (const std::string& path : kept->paths) remove(path);
   }
 }
 

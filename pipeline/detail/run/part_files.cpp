@@ -32,6 +32,15 @@ void MakeFolder(const fs::path& folder) {
   if (error) throw Error(folder.string() + ": cannot be made: " + error.message());
 }
 
+// The stage of a file "STAGE_K_of_N.done.json"; empty for other files.
+std::string StageOfRecord(const std::string& name) {
+  constexpr std::string_view kEnding = ".done.json";
+  if (!name.ends_with(kEnding)) return "";
+  const size_t of = name.rfind("_of_");
+  const size_t end = of == std::string::npos || of == 0 ? of : name.rfind('_', of - 1);
+  return end == std::string::npos ? "" : name.substr(0, end);
+}
+
 std::optional<DonePart> DoneIn(const fs::path& file) {
   if (!fs::exists(file)) return std::nullopt;
   const Json json = Json::parse(ReadFile(file, kLargestRecordBytes), nullptr, false);
@@ -118,11 +127,10 @@ DonePart TotalOf(const fs::path& work, const std::vector<std::string>& stages) {
   DonePart total;
   if (!fs::is_directory(work / kFolder)) return total;
   for (const auto& entry : fs::directory_iterator(work / kFolder)) {
-    const std::string name = entry.path().filename().string();
-    const bool counts = name.ends_with(".done.json") &&
-                        std::any_of(stages.begin(), stages.end(), [&](const std::string& stage) {
-                          return name.starts_with(stage + "_");
-                        });
+    const std::string stage = StageOfRecord(entry.path().filename().string());
+    const bool counts = std::any_of(stages.begin(), stages.end(), [&](const std::string& one) {
+      return stage == one || (one == "pass" && stage.starts_with("pass-"));
+    });
     if (!counts) continue;
     const DonePart part = DoneIn(entry.path()).value_or(DonePart{});
     total.wall_s += part.wall_s;

@@ -30,6 +30,7 @@ FileLock LockPart(const std::filesystem::path& work, const BuildPart& part);
 void WriteDonePart(const std::filesystem::path& work, const BuildPart& part, const DonePart& done);
 std::optional<DonePart> ReadDonePart(const std::filesystem::path& work, const BuildPart& part);
 /// What all parts of these stages took, and stages that one process did; 0 where there are none.
+/// "pass" is every pass.
 DonePart TotalOf(const std::filesystem::path& work, const std::vector<std::string>& stages);
 
 /// Freezes cameras for the stages after them: model, unit, origin and the photos without a camera.
