@@ -265,7 +265,10 @@ CalibratedPhotos CamerasOf(const capture::Capture& photos, const CalibrateOption
   const bool is_later = share.is_shared() && !calibrate.part;
   if (is_later || share.Is("ranges")) return FrozenCalibration(work);
   CalibratedPhotos calibrated = CalibratePhotos(photos, calibrate, work / "calibration", progress);
-  if (calibrate.part) throw PartDone();  // given cameras with their points need none of it
+  if (calibrate.part) {  // given cameras with their points need none of it
+    MarkBegun(work);
+    throw PartDone();
+  }
   if (share.Is("calibration")) FreezeCalibration(calibrated, work);
   share.EndAfter("calibration");
   return calibrated;

@@ -247,10 +247,14 @@ TEST_F(Batch, ADamagedRecordIsOneLine) {
 }
 
 TEST_F(Batch, AnotherBatchOfTheSameSetIsNotReplaced) {
-  ASSERT_EQ(RunBatch("a", {"--local", "2", "--array-size", "2"},
-                     {SIGTERM, [&] { return fs::exists(Set("a").string() + ".partial"); }})
-                    .code != 0,
-            true);
+  ASSERT_EQ(
+      RunBatch(
+          "a", {"--local", "2", "--array-size", "2"},
+          {SIGTERM,
+           [&] {
+             return fs::exists(Set("a").string() + ".partial/work/parts/capture_1_of_1.done.json");
+           }}).code != 0,
+      true);
   std::vector<std::string> other = Words("a", {"--max-size", "96"});
   other.insert(other.begin(), "batch");
   other.insert(other.end(), {"--local", "2"});

@@ -273,6 +273,13 @@ std::vector<Keys::Row> Keys::Rows() {
       {"H", [this] { HiddenView(); }},
       {"M", [this] { Marks(); }},
       {"T", [this] { ExpectPlays([] { Press("t"); }); }},
+      {", .",
+       [this] {
+         After({"key", "comma"}, "half the speed",
+               [](const Json& s) { return s["time_speed"] == 0.5; });
+         After({"key", "period"}, "twice the speed",
+               [](const Json& s) { return s["time_speed"] == 1; });
+       }},
       {"N, B",
        [this] {
          while (Now()["time_step"] != 0) {

@@ -52,9 +52,14 @@ PlaneFiles::PlaneFiles(const fs::path& folder, const std::string& made_from, boo
     : folder_(folder) {
   const fs::path origin = folder / "made_from";
   if (Exists(origin) && Reads(origin, made_from)) return;
+  if (is_shared && !Exists(origin)) {
+    throw Error(
+        "depth: expected depth ranges that were found, found none; run the stage ranges "
+        "first");
+  }
   if (is_shared) {
     throw Error(folder.string() +
-                ": expected planes of the frozen cameras, found none or others; dtr build without "
+                ": expected planes of the frozen cameras, found others; dtr build without "
                 "a stage finds depth anew");
   }
   Remove(folder);

@@ -113,6 +113,11 @@ FileLock LockPart(const fs::path& work, const BuildPart& part) {
                                work.parent_path().string(), NameOf(part)));
 }
 
+void MarkBegun(const fs::path& work) {
+  MakeFolder(work / kFolder);
+  WriteFileAtomically(work / kFolder / "begun", "");
+}
+
 void WriteDonePart(const fs::path& work, const BuildPart& part, const DonePart& done) {
   MakeFolder(work / kFolder);
   const Json json = {{"wall_s", done.wall_s}, {"cpu_s", done.cpu_s}};

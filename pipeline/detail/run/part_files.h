@@ -26,6 +26,9 @@ std::optional<DepthStagePart> DepthPartOf(const BuildPart& part, int passes);
 /// Held while a part is worked on: throws UsageError where another process does.
 FileLock LockPart(const std::filesystem::path& work, const BuildPart& part);
 
+/// A mark that the build was begun, where a stage leaves nothing else for the next.
+void MarkBegun(const std::filesystem::path& work);
+
 /// Says that a part is done, and what it took.
 void WriteDonePart(const std::filesystem::path& work, const BuildPart& part, const DonePart& done);
 std::optional<DonePart> ReadDonePart(const std::filesystem::path& work, const BuildPart& part);
