@@ -60,7 +60,7 @@ PlaneFiles::PlaneFiles(const fs::path& folder, const std::string& made_from, boo
   if (is_shared) {
     throw Error(folder.string() +
                 ": expected planes of the frozen cameras, found others; dtr build without "
-                "a stage finds depth anew");
+                "a stage finds depth again");
   }
   Remove(folder);
   MakeFolder(folder);
