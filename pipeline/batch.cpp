@@ -4,13 +4,12 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "capture/ingest.h"
-#include "capture/store.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/set_io.h"
-#include "pipeline/capture.h"
 #include "pipeline/detail/batch/batch_files.h"
 #include "pipeline/detail/batch/local.h"
 #include "pipeline/detail/batch/slurm.h"

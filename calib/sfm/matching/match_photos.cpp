@@ -51,15 +51,31 @@ std::vector<int> Missing(const std::vector<std::optional<T>>& done, const Part& 
   return missing;
 }
 
-// The pairs of these numbers in blocks whose descriptors fit into memory.
-template <typename Work>
-void ForBlocks(const std::vector<std::pair<int, int>>& pairs, const std::vector<int>& which,
-               const std::vector<double>& bytes, const MatchOptions& options, const Work& work) {
+// Works out what those pairs of the part lack that have nothing in `results` yet, in blocks whose
+// descriptors fit into memory. `find(a, b, number)` gives a pair's result from what `cache` has of
+// its photos; `keep(numbers)` keeps those of a block.
+template <typename T, typename Cache, typename Find, typename Keep>
+void FindMissing(const char* stage, const std::vector<std::pair<int, int>>& pairs, const Part& part,
+                 const std::vector<double>& bytes, const MatchOptions& options, Progress& progress,
+                 Cache& cache, std::vector<std::optional<T>>& results, const Find& find,
+                 const Keep& keep) {
+  const std::vector<int> missing = Missing(results, part);
+  const size_t all = part.End(pairs.size()) - part.Begin(pairs.size());
+  progress.Stage(stage, static_cast<int>(all));
+  std::atomic<int> done = static_cast<int>(all - missing.size());
   std::vector<std::pair<int, int>> left;
-  for (const int k : which) left.push_back(pairs[static_cast<size_t>(k)]);
+  for (const int k : missing) left.push_back(pairs[static_cast<size_t>(k)]);
   for (size_t begin = 0, end = begin; begin < left.size(); begin = end) {
     end = BlockEnd(left, begin, bytes, options.descriptor_gb * kBytesPerGigabyte, kPairsPerBlock);
-    work(std::span(left).subspan(begin, end - begin), std::span(which).subspan(begin, end - begin));
+    cache.Require(std::span(left).subspan(begin, end - begin));
+    ParallelFor(static_cast<int>(begin), static_cast<int>(end), options.threads, [&](int i) {
+      progress.ThrowIfInterrupted();
+      const auto [a, b] = left[static_cast<size_t>(i)];
+      const auto k = static_cast<size_t>(missing[static_cast<size_t>(i)]);
+      results[k] = find(a, b, k);
+      progress.Update(++done);
+    });
+    keep(std::span(missing).subspan(begin, end - begin));
   }
 }
 
@@ -70,22 +86,13 @@ void CoarseSearch(std::span<const MatchPhoto> photos, const std::vector<std::pai
   PhotoCache<LoadedDescriptors> largest(
       photos.size(), [&](int i) { return DescriptorsOf(photos, i, kLargest, options); },
       options.threads);
-  const std::vector<int> missing = Missing(coarse, part);
-  const size_t all = part.End(pairs.size()) - part.Begin(pairs.size());
-  progress.Stage("comparing features", static_cast<int>(all));
-  std::atomic<int> done = static_cast<int>(all - missing.size());
-  ForBlocks(pairs, missing, DescriptorBytes(photos, kLargest), options,
-            [&](std::span<const std::pair<int, int>> block, std::span<const int> which) {
-              largest.Require(block);
-              ParallelFor(0, static_cast<int>(which.size()), options.threads, [&](int i) {
-                progress.ThrowIfInterrupted();
-                const auto [a, b] = block[static_cast<size_t>(i)];
-                coarse[static_cast<size_t>(which[static_cast<size_t>(i)])] =
-                    CoarsePair{a, b, CoarseMatches(largest[a].all, largest[b].all)};
-                progress.Update(++done);
-              });
-              journal.AddCoarse(which, coarse);
-            });
+  FindMissing(
+      "comparing features", pairs, part, DescriptorBytes(photos, kLargest), options, progress,
+      largest, coarse,
+      [&](int a, int b, size_t) {
+        return CoarsePair{a, b, CoarseMatches(largest[a].all, largest[b].all)};
+      },
+      [&](std::span<const int> which) { journal.AddCoarse(which, coarse); });
 }
 
 // What became of the part's pairs along epipolar lines.
@@ -104,24 +111,13 @@ void Verify(std::span<const MatchPhoto> photos, const std::vector<std::pair<int,
   const auto knows = [&](int photo) -> bool {
     return graph.focal_is_known[static_cast<size_t>(photos[static_cast<size_t>(photo)].camera)];
   };
-  const std::vector<int> missing = Missing(tried, part);
-  const size_t all = part.End(pairs.size()) - part.Begin(pairs.size());
-  progress.Stage("matching", static_cast<int>(all));
-  std::atomic<int> done = static_cast<int>(all - missing.size());
-  ForBlocks(pairs, missing, DescriptorBytes(photos, kAll), options,
-            [&](std::span<const std::pair<int, int>> block, std::span<const int> which) {
-              features.Require(block);
-              ParallelFor(0, static_cast<int>(which.size()), options.threads, [&](int i) {
-                progress.ThrowIfInterrupted();
-                const auto [a, b] = block[static_cast<size_t>(i)];
-                const auto k = static_cast<size_t>(which[static_cast<size_t>(i)]);
-                tried[k] =
-                    TriedPair{GeometryOf(features[a], features[b], coarse[k], knows(a) && knows(b),
-                                         HashOf(options.seed, 2, a, b))};
-                progress.Update(++done);
-              });
-              journal.AddGeometries(which, tried);
-            });
+  FindMissing(
+      "matching", pairs, part, DescriptorBytes(photos, kAll), options, progress, features, tried,
+      [&](int a, int b, size_t k) {
+        return TriedPair{GeometryOf(features[a], features[b], coarse[k], knows(a) && knows(b),
+                                    HashOf(options.seed, 2, a, b))};
+      },
+      [&](std::span<const int> which) { journal.AddGeometries(which, tried); });
 }
 
 // All of them; throws Error where a part of the pairs is missing.

@@ -64,6 +64,13 @@ class OfFiles {
     };
     return options;
   }
+  /// The same, kept in a journal of `folder`.
+  MatchOptions Journaled(const testing::TemporaryFolder& folder) {
+    MatchOptions options = Options();
+    options.journal = folder / "journal";
+    options.journal_inputs = "inputs";
+    return options;
+  }
   MatchResult Run(const MatchOptions& options) const {
     return MatchPhotos(photos_, std::vector{Camera(1200)}, {false}, options);
   }
@@ -112,10 +119,8 @@ TEST(PairJournal, AnInterruptedRunGoesOnWhereItStopped) {
   // Ten pairs are compared and then matched; stops in every block of both.
   for (int updates = 1; updates < 20; ++updates) {
     const testing::TemporaryFolder folder;
-    MatchOptions options = files.Options();
+    MatchOptions options = files.Journaled(folder);
     options.descriptor_gb = 1e-9;
-    options.journal = folder / "journal";
-    options.journal_inputs = "inputs";
     StopsAfter stops(updates);
     options.progress = &stops;
     EXPECT_THROW(files.Run(options), Interrupted);
@@ -131,10 +136,8 @@ TEST(PairJournal, OfAnEndCutShortOrDamagedTheWholePartCounts) {
   OfFiles files;
   const MatchResult expected = files.InMemory();
   const testing::TemporaryFolder folder;
-  MatchOptions options = files.Options();
+  MatchOptions options = files.Journaled(folder);
   options.descriptor_gb = 1e-9;
-  options.journal = folder / "journal";
-  options.journal_inputs = "inputs";
   ExpectSame(files.Run(options).graph, expected.graph);
   EXPECT_GT(files.TakeLoads(), 0);
   ExpectSame(files.Run(options).graph, expected.graph);
@@ -206,9 +209,7 @@ TEST(MatchInParts, PartsInAnyOrderGiveWhatOneProcessGives) {
   using Stage = MatchPart::Stage;
   OfFiles files;
   const testing::TemporaryFolder folder;
-  MatchOptions options = files.Options();
-  options.journal = folder / "journal";
-  options.journal_inputs = "inputs";
+  MatchOptions options = files.Journaled(folder);
   RunPart(files, options, Stage::kPairs, 0, 1);
   for (const int index : {2, 0, 1}) RunPart(files, options, Stage::kMatching, index, 3);
   // Parts of another number overlap with these and do them no harm.
@@ -225,9 +226,7 @@ TEST(MatchInParts, WhatAPartNeedsAndNobodyDidIsNamed) {
   using Stage = MatchPart::Stage;
   OfFiles files;
   const testing::TemporaryFolder folder;
-  MatchOptions options = files.Options();
-  options.journal = folder / "journal";
-  options.journal_inputs = "inputs";
+  MatchOptions options = files.Journaled(folder);
   const auto message = [&](Stage stage) {
     options.part = {stage, {0, 2}};
     try {
