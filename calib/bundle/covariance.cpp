@@ -23,57 +23,98 @@ namespace {
 // of the observations' typical information.
 constexpr double kSettled = 1e-12;
 
-// Adds what the observations of one point, the point eliminated, say about lenses and poses.
-void AddPoint(const Normalised& n, const Bundle& bundle, const BundleCovariance& layout,
-              const std::vector<const BundleObservation*>& observations,
-              Eigen::MatrixXd& information) {
-  std::vector<int> columns;  // unknowns these observations depend on
+// Sums over points, of what their observations say with the point eliminated: J^T J, and g g^T with
+// g = J^T r of a point as a whole.
+struct Sums {
+  Eigen::MatrixXd information, scatter;
+  int points = 0;  // that say something
+  long rows = 0;   // of J
+};
+
+// The unknowns that the observations of one point depend on, and their rows.
+struct TrackRows {
+  std::vector<int> columns;  // unknowns
   std::vector<ObservationRows> rows;
-  std::vector<std::pair<int, int>> lens_image;
-  const auto column_of = [&](int unknown) {
+  std::vector<std::pair<int, int>> lens_image;  // of each of `rows`
+
+  long ColumnOf(int unknown) {
     const auto found = std::find(columns.begin(), columns.end(), unknown);
     if (found != columns.end()) return static_cast<long>(found - columns.begin());
     columns.push_back(unknown);
     return static_cast<long>(columns.size()) - 1;
-  };
+  }
+};
+
+TrackRows RowsOfTrack(const Normalised& n, const Bundle& bundle, const BundleCovariance& layout,
+                      const std::vector<const BundleObservation*>& observations) {
+  TrackRows track;
   for (const BundleObservation* observation : observations) {
     ObservationRows made;
     if (!RowsOf(n, bundle, *observation, made)) continue;
     const int lens = bundle.images[static_cast<size_t>(observation->image)].lens;
     for (size_t k = 0; k < layout.free_params[static_cast<size_t>(lens)].size(); ++k) {
-      column_of(layout.lens_at[static_cast<size_t>(lens)] + static_cast<int>(k));
+      track.ColumnOf(layout.lens_at[static_cast<size_t>(lens)] + static_cast<int>(k));
     }
     for (int k = 0; k < 6; ++k) {
-      column_of(layout.image_at[static_cast<size_t>(observation->image)] + k);
+      track.ColumnOf(layout.image_at[static_cast<size_t>(observation->image)] + k);
     }
-    rows.push_back(std::move(made));
-    lens_image.emplace_back(lens, observation->image);
+    track.rows.push_back(std::move(made));
+    track.lens_image.emplace_back(lens, observation->image);
   }
-  const auto height = 2 * static_cast<long>(rows.size());
+  return track;
+}
+
+void AddPoint(const Normalised& n, const Bundle& bundle, const BundleCovariance& layout,
+              const std::vector<const BundleObservation*>& observations, Sums& sums) {
+  TrackRows track = RowsOfTrack(n, bundle, layout, observations);
+  const auto height = 2 * static_cast<long>(track.rows.size());
   if (height < 4) return;  // one observation says nothing about anything but its point
+  const auto unknowns = static_cast<long>(track.columns.size());
   Eigen::MatrixXd by_point(height, 3);
-  Eigen::MatrixXd by_rest = Eigen::MatrixXd::Zero(height, static_cast<long>(columns.size()));
-  for (size_t i = 0; i < rows.size(); ++i) {
+  Eigen::MatrixXd rest = Eigen::MatrixXd::Zero(height, unknowns + 1);  // the last: residuals
+  for (size_t i = 0; i < track.rows.size(); ++i) {
     const auto at = 2 * static_cast<long>(i);
-    by_point.middleRows<2>(at) = rows[i].point;
-    const auto [lens, image] = lens_image[i];
+    const ObservationRows& rows = track.rows[i];
+    by_point.middleRows<2>(at) = rows.point;
+    rest.block<2, 1>(at, unknowns) = rows.residual;
+    const auto [lens, image] = track.lens_image[i];
     const auto& free = layout.free_params[static_cast<size_t>(lens)];
     for (size_t k = 0; k < free.size(); ++k) {
-      by_rest.block<2, 1>(at, column_of(layout.lens_at[static_cast<size_t>(lens)] +
-                                        static_cast<int>(k))) = rows[i].lens.col(free[k]);
+      const int unknown = layout.lens_at[static_cast<size_t>(lens)] + static_cast<int>(k);
+      rest.block<2, 1>(at, track.ColumnOf(unknown)) = rows.lens.col(free[k]);
     }
     for (int k = 0; k < 6; ++k) {
-      by_rest.block<2, 1>(at, column_of(layout.image_at[static_cast<size_t>(image)] + k)) =
-          rows[i].pose.col(k);
+      const int unknown = layout.image_at[static_cast<size_t>(image)] + k;
+      rest.block<2, 1>(at, track.ColumnOf(unknown)) = rows.pose.col(k);
     }
   }
-  const Eigen::MatrixXd left = WithoutPoint(by_point, by_rest);
-  const Eigen::MatrixXd product = left.transpose() * left;
-  for (size_t i = 0; i < columns.size(); ++i) {
-    for (size_t j = 0; j < columns.size(); ++j) {
-      information(columns[i], columns[j]) += product(static_cast<long>(i), static_cast<long>(j));
+  const Eigen::MatrixXd left = WithoutPoint(by_point, rest);
+  const Eigen::MatrixXd product = left.leftCols(unknowns).transpose() * left;
+  for (long i = 0; i < unknowns; ++i) {
+    const int row = track.columns[static_cast<size_t>(i)];
+    for (long j = 0; j < unknowns; ++j) {
+      const int column = track.columns[static_cast<size_t>(j)];
+      sums.information(row, column) += product(i, j);
+      sums.scatter(row, column) += product(i, unknowns) * product(j, unknowns);
     }
   }
+  ++sums.points;
+  sums.rows += left.rows();
+}
+
+// Covariance of the gradient at the solution. Errors of one point's observations are not
+// independent, and not equally large: a feature of a far side drifts along its whole track. So a
+// point counts as a whole (Liang and Zeger 1986, "Longitudinal data analysis using generalized
+// linear models", eq. 5), widened for what the solve has fitted. Of few points that says little:
+// by as much as there are unknowns per point it is pulled to sigma^2 J^T J, of independent errors.
+// Nothing is known better than to kPrecisionPx.
+Eigen::MatrixXd OfGradient(const Sums& sums, double sigma_px) {
+  const auto unknowns = static_cast<double>(sums.information.rows());
+  const auto rows = static_cast<double>(sums.rows);
+  const double independent = std::min(1.0, unknowns / std::max(1, sums.points));
+  if (independent >= 1 || rows <= unknowns) return sigma_px * sigma_px * sums.information;
+  const double variance = independent * sigma_px * sigma_px + kPrecisionPx * kPrecisionPx;
+  return variance * sums.information + (1 - independent) * rows / (rows - unknowns) * sums.scatter;
 }
 
 void AddLensInformation(const Normalised& n, const Bundle& bundle, const BundleCovariance& layout,
@@ -150,9 +191,10 @@ std::string NameOfUnknown(const Bundle& bundle, const BundleCovariance& layout, 
   return "";
 }
 
-// Inverts the information with the gauge's directions left out.
+// Inverts the information with the gauge's directions left out: H^-1 G H^-1, G the covariance of
+// the gradient.
 void Invert(const Bundle& bundle, const Eigen::MatrixXd& information, const Eigen::MatrixXd& open,
-            BundleCovariance& out) {
+            const Eigen::MatrixXd& of_gradient, BundleCovariance& out) {
   const long unknowns = information.rows();
   const double typical = information.trace() / static_cast<double>(unknowns);
   const Eigen::MatrixXd closed = information + typical * open * open.transpose();
@@ -175,9 +217,9 @@ void Invert(const Bundle& bundle, const Eigen::MatrixXd& information, const Eige
                                     : std::numeric_limits<double>::infinity();
   out.determined = inverse.matrix.size() > 0;
   if (!out.determined) return;
-  out.matrix = scale.asDiagonal() * inverse.matrix * scale.asDiagonal();
-  out.matrix -= open * open.transpose() / typical;
-  out.matrix *= out.sigma_px * out.sigma_px;
+  Eigen::MatrixXd inverted = scale.asDiagonal() * inverse.matrix * scale.asDiagonal();
+  inverted -= open * open.transpose() / typical;
+  out.matrix = inverted * of_gradient * inverted;
 }
 
 // From the solver's units to parameters, radians and world units.
@@ -230,18 +272,20 @@ BundleCovariance CovarianceOf(const Adjusted& adjusted, const AdjustOptions& opt
   if (unknowns > kMaxUnknowns) return out;
   out.computed = true;
   const Normalised n = Normalised::Around(bundle);
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(unknowns, unknowns);
+  Sums sums;
+  sums.information = sums.scatter = Eigen::MatrixXd::Zero(unknowns, unknowns);
   std::vector<std::vector<const BundleObservation*>> tracks(bundle.points.size());
   for (size_t i = 0; i < bundle.observations.size(); ++i) {
     if (!adjusted.used[i]) continue;
     tracks[static_cast<size_t>(bundle.observations[i].point)].push_back(&bundle.observations[i]);
   }
-  for (const auto& observations : tracks) AddPoint(n, bundle, out, observations, information);
+  for (const auto& observations : tracks) AddPoint(n, bundle, out, observations, sums);
   const Eigen::MatrixXd priors = PriorInformation(n, bundle, out, options, unknowns);
   const Eigen::MatrixXd open = OpenDirections(GaugeDirections(n.poses, out.image_at, unknowns),
-                                              priors, information.trace() / unknowns);
+                                              priors, sums.information.trace() / unknowns);
   out.gauge_freedom = static_cast<int>(open.cols());
-  Invert(bundle, information + priors, open, out);
+  Invert(bundle, sums.information + priors, open,
+         OfGradient(sums, out.sigma_px) + out.sigma_px * out.sigma_px * priors, out);
   if (out.determined) ToUnits(n, out);
   return out;
 }

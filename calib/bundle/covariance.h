@@ -9,7 +9,8 @@
 namespace dtr::calib {
 
 /// Covariance of all lenses and poses (shifts of images are taken as known), points eliminated
-/// (Schur complement, Triggs et al. 2000, sec. 6.1), in units of the bundle's world. Unknowns, in
+/// (Schur complement, Triggs et al. 2000, sec. 6.1), in units of the bundle's world. Observations
+/// of one point are not taken for independent (Liang and Zeger 1986; METHODS.md, 6). Unknowns, in
 /// order: per lens its free parameters, per image a turn w (radians, along the camera's axes:
 /// p_in_cam = exp(w) p_in_cam) and the centre's shift (world units).
 ///

@@ -98,6 +98,38 @@ TEST(Covariance, PosesErrInTheGaugeOfTheStartAsPredicted) {
   EXPECT_NEAR(chi2 / (5 * kSolves), 1, 0.25);
 }
 
+// Five photos in a row see a feature off by the same: taken closely, they say no more than one
+// does.
+Bundle WithErrorsOfFivePhotosInARow(const Bundle& truth, std::uint64_t seed) {
+  Bundle bundle = truth;
+  for (auto& observation : bundle.observations) {
+    const auto point = static_cast<std::uint64_t>(observation.point);
+    Random random((seed * 100000 + point) * 100 +
+                  static_cast<std::uint64_t>(observation.image / 5));
+    const double x = random.Normal();
+    observation.pixel += 0.3 * Eigen::Vector2d(x, random.Normal());
+  }
+  return bundle;
+}
+
+TEST(Covariance, ErrorsThatTheObservationsOfAPointShareAreNotTakenForIndependent) {
+  SceneSpec spec{.images = 30, .points = 800, .noise_px = 0, .seed = 21};
+  const Bundle truth = MakeBundle(spec);
+  double chi2 = 0;
+  constexpr int kSolves = 10;
+  for (int s = 0; s < kSolves; ++s) {
+    const Bundle seen = WithErrorsOfFivePhotosInARow(truth, 900 + static_cast<std::uint64_t>(s));
+    const Adjusted out = Adjust(seen, AllFree());
+    const Eigen::VectorXd error =
+        Eigen::Map<const Eigen::VectorXd>(out.bundle.lenses[0].params.data(), 5) -
+        Eigen::Map<const Eigen::VectorXd>(truth.lenses[0].params.data(), 5);
+    const Eigen::MatrixXd predicted = CovarianceOf(out, AllFree()).OfLens(out.bundle, 0);
+    chi2 += error.dot(predicted.ldlt().solve(error)) / 5;
+  }
+  // With each observation taken for independent of the others: 3.3.
+  EXPECT_NEAR(chi2 / kSolves, 1, 3 * std::sqrt(2.0 / (5 * kSolves)));
+}
+
 TEST(Covariance, TransferDoesNotDependOnTheWorld) {
   const Bundle bundle = MakeBundle(Small(3));
   Similarity world;
