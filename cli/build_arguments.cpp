@@ -42,6 +42,13 @@ void AddDynamicOptions(CLI::App& command, BuildArguments& arguments) {
       ->check(CLI::IsMember({"on", "off"}))
       ->needs(dynamic);
   command
+      .add_option("--clocks", arguments.clocks,
+                  "With --dynamic: synchronised: frames of equal number are of one time; free: "
+                  "cameras began when they liked, and how many frames later each one's are is "
+                  "found from what moves [synchronised]")
+      ->check(CLI::IsMember({"synchronised", "free"}))
+      ->needs(dynamic);
+  command
       .add_option("--video", arguments.video,
                   "With --dynamic: store the images of source cameras as H.264 videos of this rate "
                   "factor, 1 (largest) to 51, or lossless [every image a PNG]")
@@ -146,6 +153,7 @@ void FinishBuildArguments(const CommonOptions& common, BuildArguments& arguments
   options.seed = common.seed;
   options.part = PartFrom(arguments);
   arguments.dynamic.temporal = arguments.temporal == "on";
+  arguments.dynamic.free_clocks = arguments.clocks == "free";
   if (!arguments.video.empty()) arguments.dynamic.video = io::VideoQualityFrom(arguments.video);
 }
 

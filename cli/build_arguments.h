@@ -12,7 +12,7 @@ namespace dtr::cli {
 struct BuildArguments {
   pipeline::BuildOptions options;
   bool is_dynamic = false;
-  std::string temporal = "on", video;
+  std::string temporal = "on", clocks = "synchronised", video;
   std::string stage, part = "1/1";
   pipeline::DynamicOptions dynamic;
   MetreWords metre_words;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
@@ -93,7 +94,20 @@ Json DynamicJson(const Recording& recording, const BuildOptions& options,
                {"every", std::max(1, options.video.every)},
                {"fps", dynamic.fps.value_or(0)},
                {"temporal", temporal}};
+  json["clocks"] = dynamic.free_clocks ? "free" : "synchronised";
   if (dynamic.video) json["video"] = io::NameOf(*dynamic.video);
+  return json;
+}
+
+Json ClocksJson(const Recording& recording, const std::vector<calib::MotionClock>& clocks) {
+  Json json = Json::array();
+  for (size_t c = 0; c < clocks.size(); ++c) {
+    json.push_back({{"camera", recording.cameras()[c]},
+                    {"frames_later", clocks[c].later},
+                    {"frames_taken_later", std::lround(clocks[c].later)},
+                    {"rms_frames", clocks[c].rms_frames},
+                    {"pairs", clocks[c].pairs}});
+  }
   return json;
 }
 
@@ -198,13 +212,13 @@ BuildReport BuildDynamicSet(const BuildOptions& asked, const DynamicOptions& dyn
   RunLog log;
   RecordedNotes progress(listener);
   log.Begin("capture");
-  const Recording recording(
-      options.photos, {std::max(1, options.video.every), dynamic.from, dynamic.to, dynamic.fps},
-      progress);
+  Recording recording(options.photos,
+                      {std::max(1, options.video.every), dynamic.from, dynamic.to, dynamic.fps},
+                      progress);
   const std::vector<bool> held_out = ChooseHeldOut(options.holdout, recording.cameras());
   if (fixed.rig) RequireRigCameras(*fixed.rig, recording, progress);
   const Json files = FilesJson(recording, options.photos);
-  const Json dynamic_json = DynamicJson(recording, options, dynamic, temporal);
+  Json dynamic_json = DynamicJson(recording, options, dynamic, temporal);
   Json fingerprint = {{"tool_version", DTR_VERSION},
                       {"options", OptionsJson(options, quality)},
                       {"dynamic", dynamic_json},
@@ -220,6 +234,7 @@ BuildReport BuildDynamicSet(const BuildOptions& asked, const DynamicOptions& dyn
   fixed.calibrate.refine = options.refine;
   fixed.calibrate.sfm = options.sfm;
   fixed.max_size_px = options.max_size_px;
+  fixed.free_clocks = dynamic.free_clocks;
   const FixedCameras cameras =
       CalibrateFixedCameras(recording, fixed, writer.work_folder() / "calibration", progress);
   log.AddEarlier(cameras.calibrated.earlier_wall_s, cameras.calibrated.earlier_cpu_s);
@@ -243,6 +258,10 @@ BuildReport BuildDynamicSet(const BuildOptions& asked, const DynamicOptions& dyn
   }
   Json provenance =
       ProvenanceJson(options, OptionsJson(options, quality), files, cameras.calibrated, report);
+  if (dynamic.free_clocks) {
+    dynamic_json = DynamicJson(recording, options, dynamic, temporal);
+    dynamic_json["found_clocks"] = ClocksJson(recording, cameras.clocks);
+  }
   provenance["dynamic"] = dynamic_json;
   set.provenance_json = provenance.dump();
   writer.WriteSparse(set, cameras.sparse);

@@ -18,6 +18,9 @@ struct DynamicOptions {
   /// Depth begins with that of the time step before, and what does not move keeps one depth for
   /// all; false: every time step alone.
   bool temporal = true;
+  /// Cameras began when they liked: how many frames later each one's are is found from what moves,
+  /// and time steps take the nearest frames.
+  bool free_clocks = false;
   /// Images of source cameras as videos; empty: every one a PNG.
   std::optional<io::VideoQuality> video;
 };

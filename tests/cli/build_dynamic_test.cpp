@@ -1,4 +1,6 @@
 // `dtr build --dynamic` as its users meet it: the toys as fixed cameras saw them.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <csignal>
@@ -6,6 +8,7 @@
 
 #include "dtr/base/files.h"
 #include "dtr/base/process.h"
+#include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/support/test_data.h"
@@ -14,6 +17,7 @@ namespace dtr::testing {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::HasSubstr;
 using Json = nlohmann::json;
 
 constexpr int kSteps = 4;
@@ -116,17 +120,80 @@ TEST_F(BuildDynamic, VideosGiveTheSameSetAsPhotos) {
   }
 }
 
-TEST_F(BuildDynamic, VideosOfDifferentRatesAreRejected) {
+TEST_F(BuildDynamic, OfFasterVideosTheFramesNearestInTimeAreTaken) {
   if (FindProgram("ffmpeg").empty()) GTEST_SKIP() << "SKIPPED: no program ffmpeg";
   fs::create_directories(At("rates"));
-  for (const std::string fps : {"10", "12"}) {
-    DtrOk({"dataset", "make", "toys", "-o", At("at" + fps), "--views", "2", "--steps", "3",
-           "--width", "48", "--height", "32", "--supersampling", "1", "--videos", "--fps", fps});
+  for (const std::string fps : {"10", "25"}) {
+    DtrOk({"dataset", "make", "toys", "-o", At("at" + fps), "--views", "2", "--steps",
+           fps == "10" ? "5" : "12", "--width", "48", "--height", "32", "--supersampling", "1",
+           "--videos", "--fps", fps});
     const std::string camera = fps == "10" ? "cam00.mkv" : "cam01.mkv";
     fs::copy_file(At("at" + fps + "/videos/" + camera), At("rates/" + camera));
   }
-  ExpectRejected(Dtr({"build", At("rates"), "--dynamic", "-o", At("none.dtr")}), kFailed,
-                 "expected videos of one rate, as frames are not resampled");
+  DtrOk({"dataset", "make", "toys", "-o", At("stills"), "--views", "2", "--steps", "12", "--width",
+         "48", "--height", "32", "--supersampling", "1", "--fps", "25"});
+  const Ran ran = DtrOk({"build", At("rates"), "--dynamic", "--rig", At("at10/rig.json"),
+                         "--engine", "none", "-o", At("rates.dtr")});
+  EXPECT_THAT(ran.err, HasSubstr("cam00.mkv: 10.000 frames per second, cam01.mkv: 25.000"));
+  const DtrSet set = io::LoadSet(At("rates.dtr"));
+  ASSERT_EQ(set.frames.size(), 5u);
+  const int nearest[] = {0, 3, 5, 8, 10};  // of 25 frames a second; half a frame goes up
+  for (size_t step = 0; step < 5; ++step) {
+    EXPECT_DOUBLE_EQ(set.frames[step].time_s, 0.1 * static_cast<double>(step));
+    EXPECT_EQ(set.frames[step].views[1].image,
+              io::ReadImage(At(fmt::format("stills/photos/cam01/{:04}.png", nearest[step]))));
+  }
+}
+
+// Photos of 24 time steps; in `apart` two cameras began at other times than the rest.
+void MakePhotosWithClocksApart(const std::string& toys, const std::string& apart) {
+  DtrOk({"dataset", "make", "toys", "-o", toys, "--views", "5", "--steps", "24", "--width", "120",
+         "--height", "80", "--noise", "1", "--supersampling", "1"});
+  for (int camera = 0; camera < 5; ++camera) {
+    const std::string folder = fmt::format("/cam0{}/", camera);
+    const int later = camera == 1 ? 3 : camera == 3 ? -2 : 0;
+    fs::create_directories(apart + folder);
+    for (int step = 0; step < 24; ++step) {
+      fs::copy_file(toys + "/photos" + folder + fmt::format("{:04}.png", step),
+                    apart + folder + fmt::format("{:04}.png", step + later + 5));
+    }
+  }
+}
+
+TEST_F(BuildDynamic, ClocksThatDifferAreFoundFromWhatMoves) {
+  MakePhotosWithClocksApart(At("clocks"), At("apart"));
+  const Ran ran = DtrOk({"build", At("apart"), "--dynamic", "--clocks", "free", "--rig",
+                         At("clocks/rig.json"), "--engine", "none", "-o", At("apart.dtr")});
+  EXPECT_THAT(ran.err, HasSubstr("clocks: frames later than those of cam00"));
+  const DtrSet set = io::LoadSet(At("apart.dtr"));
+  ASSERT_EQ(set.frames.size(), 24u);
+  for (size_t step = 0; step < set.frames.size(); ++step) {
+    for (const View& view : set.frames[step].views) {
+      EXPECT_EQ(view.image,
+                io::ReadImage(At(fmt::format("clocks/photos/{}/{:04}.png", view.name, step))))
+          << view.name << " at " << step;
+    }
+  }
+  const Json clocks = Json::parse(set.provenance_json)["dynamic"]["found_clocks"];
+  const int later[] = {0, 3, 0, -2, 0};
+  for (size_t c = 0; c < 5; ++c) {
+    EXPECT_EQ(clocks[c]["frames_taken_later"], later[c]);
+    EXPECT_NEAR(clocks[c]["frames_later"], later[c], 0.3);
+  }
+}
+
+TEST_F(BuildDynamic, ClocksOfAStillSceneAreRejected) {
+  fs::create_directories(At("still"));
+  for (const std::string camera : {"cam00", "cam01"}) {
+    fs::create_directories(At("still/" + camera));
+    for (int step = 0; step < 12; ++step) {
+      fs::copy_file(At("toys/photos/" + camera + "/0000.png"),
+                    At("still/" + camera + fmt::format("/{:04}.png", step)));
+    }
+  }
+  ExpectRejected(Dtr({"build", At("still"), "--dynamic", "--clocks", "free", "--rig",
+                      At("toys/rig.json"), "-o", At("none.dtr")}),
+                 kFailed, "clocks: camera cam01: expected motion that it and another camera see");
 }
 
 TEST_F(BuildDynamic, GoesOnWhereItWasInterruptedToTheSameBytes) {
@@ -264,6 +331,8 @@ TEST_F(BuildDynamic, CamerasOfAnotherSizeAreNamed) {
   ExpectRejected(Dtr(Build("mixed.dtr", {}, "mixed")), kFailed,
                  "camera cam00, time step 0002: expected 160 x 108 px as its other images, found "
                  "80 x 54");
+  ExpectRejected(Dtr(Build("none.dtr", {"--clocks", "free"}, "mixed")), kFailed,
+                 "camera cam00: expected 160 x 108 px as it was calibrated with, found 80 x 54");
 }
 
 TEST_F(BuildDynamic, RejectsWhatDoesNotGoTogether) {

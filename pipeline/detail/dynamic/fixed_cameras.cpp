@@ -12,6 +12,7 @@
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/io/image_io.h"
+#include "pipeline/detail/dynamic/scene_clocks.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -167,11 +168,17 @@ void RequireRigCameras(const SetRig& rig, const Recording& recording, const Prog
   }
 }
 
-FixedCameras CalibrateFixedCameras(const Recording& recording, const FixedCameraOptions& options,
+FixedCameras CalibrateFixedCameras(Recording& recording, const FixedCameraOptions& options,
                                    const fs::path& workspace, Progress& progress) {
   FixedCameras cameras;
+  // Where clocks differ the first images are not of one time, but most of what they show stands.
   cameras.calibrated = FirstStep(recording, options, workspace, progress);
   TakeCameras(recording, cameras);
+  if (options.free_clocks) {
+    cameras.clocks = FindClocks(recording, cameras.lens, cameras.cam_from_world,
+                                options.calibrate.threads, progress);
+    ShiftByClocks(cameras.clocks, recording, progress);
+  }
   cameras.sparse = PointsOf(recording, cameras, options.max_size_px, cameras.calibrated.model);
   cameras.all_points = cameras.sparse;
   const size_t last = recording.steps().size() - 1;

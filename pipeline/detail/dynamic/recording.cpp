@@ -19,13 +19,18 @@ namespace fs = std::filesystem;
 
 constexpr double kPhotosPerSecond = 24;  // as dtr join has it
 
-// Per time step, which shot each camera has of it.
-std::map<std::string, std::map<size_t, size_t>> ShotsByStep(const RigLayout& layout) {
-  std::map<std::string, std::map<size_t, size_t>> by_step;
+// What cameras have, by time in frames: which shot each has then.
+using ShotsByTime = std::map<size_t, std::map<size_t, size_t>>;
+
+ShotsByTime ShotsOf(const RigLayout& layout) {
+  const std::vector<size_t> times = FrameTimes(layout.frames);
+  std::map<std::string, size_t> time_of;
+  for (size_t i = 0; i < times.size(); ++i) time_of[layout.frames[i]] = times[i];
+  ShotsByTime shots;
   for (size_t i = 0; i < layout.shots.size(); ++i) {
-    by_step[layout.shots[i].frame][layout.shots[i].camera] = i;
+    shots[time_of.at(layout.shots[i].frame)][layout.shots[i].camera] = i;
   }
-  return by_step;
+  return shots;
 }
 
 double StepsPerSecond(const RigLayout& layout, const StepChoice& choice) {
@@ -36,45 +41,70 @@ double StepsPerSecond(const RigLayout& layout, const StepChoice& choice) {
   return rate > 0 ? rate : kPhotosPerSecond;
 }
 
-// Frames of equal number are of one time only where all videos run at one rate.
-void RequireOneRate(const fs::path& folder, const RigLayout& layout) {
-  constexpr double kSameRate = 1e-3;  // relative: 29.97 and 30 differ by as much
+// Frames of equal number are of one time only where all videos run at one rate. Others keep the
+// frames nearest in time to those of the slowest, under its numbers.
+void ResampleToOneRate(const fs::path& folder, RigLayout& layout, Progress& progress) {
+  constexpr double kSameRate = 1e-6;  // relative
   if (layout.shots.front().number < 0 || fs::exists(folder / "timestamps.csv")) return;
   std::map<fs::path, double> rates;
   for (const RigShot& shot : layout.shots) rates.emplace(shot.file, 0);
-  for (auto& [file, rate] : rates) rate = capture::VideoReader(file).frames_per_second();
-  const auto& [first_file, first_rate] = *rates.begin();
-  for (const auto& [file, rate] : rates) {
-    if (std::abs(rate - first_rate) < kSameRate * first_rate) continue;
-    throw Error(fmt::format(
-        "{}: {:.3f} frames per second, {}: {:.3f}; expected videos of one rate, as frames are not "
-        "resampled, or timestamps.csv, which states the frames of each time step",
-        first_file.string(), first_rate, file.string(), rate));
+  for (auto& [file, rate] : rates) {
+    rate = capture::VideoReader(file).frames_per_second();
+    if (!(rate > 0)) return;  // not stated
   }
+  const auto slower = [](const auto& a, const auto& b) { return a.second < b.second; };
+  const auto [slowest, rate] = *std::min_element(rates.begin(), rates.end(), slower);
+  const auto [fastest, most] = *std::max_element(rates.begin(), rates.end(), slower);
+  if (most - rate <= kSameRate * rate) return;
+  progress.Note(fmt::format(
+      "{}: {:.3f} frames per second, {}: {:.3f}; of faster videos the frames nearest in time are "
+      "taken, at most {:.1f} ms off",
+      slowest.filename().string(), rate, fastest.filename().string(), most, 500 / most));
+  std::map<fs::path, std::map<int, size_t>> at;
+  for (size_t i = 0; i < layout.shots.size(); ++i) {
+    at[layout.shots[i].file][layout.shots[i].number] = i;
+  }
+  RigLayout resampled = layout;
+  resampled.shots.clear();
+  std::set<int> numbers;
+  for (const auto& [file, own_rate] : rates) {
+    const std::map<int, size_t>& own = at[file];
+    for (int number = 0;; ++number) {
+      const int nearest = static_cast<int>(std::lround(number * own_rate / rate));
+      if (nearest > own.rbegin()->first) break;
+      const auto shot = own.find(nearest);
+      if (shot == own.end()) continue;
+      resampled.shots.push_back(layout.shots[shot->second]);
+      resampled.shots.back().frame = std::to_string(number);
+      numbers.insert(number);
+    }
+  }
+  std::stable_sort(resampled.shots.begin(), resampled.shots.end(),
+                   [](const RigShot& a, const RigShot& b) { return a.camera < b.camera; });
+  resampled.frames.clear();
+  for (const int number : numbers) resampled.frames.push_back(std::to_string(number));
+  layout = std::move(resampled);
 }
 
-// The time steps that all cameras have.
-std::vector<RecordedStep> WholeSteps(const fs::path& folder, const RigLayout& layout, double fps,
+// The time steps that all cameras have, each camera's image `later` frames after its number.
+std::vector<RecordedStep> WholeSteps(const fs::path& folder, const RigLayout& layout,
+                                     const std::vector<int>& later, double fps,
                                      Progress& progress) {
-  const auto by_step = ShotsByStep(layout);
+  const ShotsByTime shots = ShotsOf(layout);
   const std::vector<size_t> times = FrameTimes(layout.frames);
   std::vector<RecordedStep> steps;
   std::string first_missing;
-  size_t left_out = 0;
   for (size_t i = 0; i < layout.frames.size(); ++i) {
-    const std::map<size_t, size_t>& shots = by_step.at(layout.frames[i]);
-    if (shots.size() < layout.cameras.size()) {
-      for (size_t c = 0; c < layout.cameras.size() && first_missing.empty(); ++c) {
-        if (!shots.contains(c)) {
-          first_missing = fmt::format("{} of camera {}", layout.frames[i], layout.cameras[c]);
-        }
-      }
-      ++left_out;
-      continue;
-    }
     RecordedStep step{layout.frames[i], static_cast<double>(times[i]) / fps, {}};
-    for (const auto& [camera, shot] : shots) step.shots.push_back(shot);
-    steps.push_back(std::move(step));
+    for (size_t c = 0; c < layout.cameras.size(); ++c) {
+      const auto then = shots.find(times[i] + static_cast<size_t>(later[c]));  // wraps below 0
+      if (then != shots.end() && then->second.contains(c)) {
+        step.shots.push_back(then->second.at(c));
+      } else if (first_missing.empty()) {
+        first_missing = fmt::format("{} of camera {}", layout.frames[i], layout.cameras[c]);
+      }
+    }
+    if (step.shots.size() == layout.cameras.size()) steps.push_back(std::move(step));
   }
   if (steps.empty()) {
     throw Error(fmt::format(
@@ -82,10 +112,10 @@ std::vector<RecordedStep> WholeSteps(const fs::path& folder, const RigLayout& la
         "one time step have equal names or numbers, or rows of one sync_index in timestamps.csv",
         folder.string(), layout.cameras.size()));
   }
-  if (left_out > 0) {
+  if (steps.size() < layout.frames.size()) {
     progress.Note(
         fmt::format("{} of {} time steps left out: not all cameras have an image, first {}",
-                    left_out, layout.frames.size(), first_missing));
+                    layout.frames.size() - steps.size(), layout.frames.size(), first_missing));
   }
   return steps;
 }
@@ -106,15 +136,49 @@ std::vector<RecordedStep> Chosen(std::vector<RecordedStep> steps, const StepChoi
   return chosen;
 }
 
+// Hands out shots of one camera under their keys. Frames of a video in rising order.
+void HandOut(const std::map<size_t, const RigShot*>& wanted,
+             const std::function<void(size_t key, const ImageRgb8& image)>& take,
+             const Progress& progress) {
+  std::map<int, size_t> of_video;  // frame number -> key
+  fs::path file;
+  for (const auto& [key, shot] : wanted) {
+    if (shot->number >= 0) {
+      of_video[shot->number] = key;
+      file = shot->file;
+      continue;
+    }
+    progress.ThrowIfInterrupted();
+    take(key, io::ReadImage(shot->file));
+  }
+  if (of_video.empty()) return;
+  capture::VideoReader video(file);
+  while (!of_video.empty() && video.Next()) {
+    progress.ThrowIfInterrupted();
+    const auto found = of_video.find(video.number());
+    if (found == of_video.end()) continue;
+    take(found->second, video.Picture());
+    of_video.erase(found);
+  }
+  if (of_video.empty()) return;
+  throw Error(fmt::format("{}: frame {}: cannot be decoded a second time; is the file changing?",
+                          file.string(), of_video.begin()->first));
+}
+
 }  // namespace
 
 Recording::Recording(const fs::path& folder, const StepChoice& choice, Progress& progress)
-    : folder_(folder), layout_(RigLayoutOf(folder, progress)) {
+    : folder_(folder), choice_(choice), layout_(RigLayoutOf(folder, progress)) {
   for (const auto& left_out : layout_.left_out) {
     progress.Note(left_out.name + ": " + left_out.reason);
   }
-  RequireOneRate(folder, layout_);
-  steps_ = Chosen(WholeSteps(folder, layout_, StepsPerSecond(layout_, choice), progress), choice);
+  ResampleToOneRate(folder, layout_, progress);
+  steps_per_second_ = StepsPerSecond(layout_, choice);
+  Shift(std::vector<int>(layout_.cameras.size()), progress);
+}
+
+void Recording::Shift(const std::vector<int>& later, Progress& progress) {
+  steps_ = Chosen(WholeSteps(folder_, layout_, later, steps_per_second_, progress), choice_);
 }
 
 std::vector<fs::path> Recording::Files() const {
@@ -126,33 +190,31 @@ std::vector<fs::path> Recording::Files() const {
   return {files.begin(), files.end()};
 }
 
+void Recording::ForEachFrame(size_t camera, size_t most,
+                             const std::function<void(size_t, const ImageRgb8&)>& take,
+                             const Progress& progress) const {
+  const ShotsByTime shots = ShotsOf(layout_);
+  const RigShot& first = layout_.shots[steps_.front().shots.front()];
+  const size_t from = FrameTimes(layout_.frames)[static_cast<size_t>(
+      std::find(layout_.frames.begin(), layout_.frames.end(), first.frame) -
+      layout_.frames.begin())];
+  std::map<size_t, const RigShot*> wanted;
+  for (auto then = shots.lower_bound(from); then != shots.end(); ++then) {
+    if (then->first - from >= most) break;
+    const auto shot = then->second.find(camera);
+    if (shot != then->second.end()) wanted[then->first - from] = &layout_.shots[shot->second];
+  }
+  HandOut(wanted, take, progress);
+}
+
 void Recording::ForEach(size_t camera, const std::function<bool(size_t)>& wanted,
                         const std::function<void(size_t, const ImageRgb8&)>& take,
                         const Progress& progress) const {
-  std::map<int, size_t> of_video;  // frame number -> time step
+  std::map<size_t, const RigShot*> shots;
   for (size_t step = 0; step < steps_.size(); ++step) {
-    if (!wanted(step)) continue;
-    const RigShot& shot = layout_.shots[steps_[step].shots[camera]];
-    if (shot.number >= 0) {
-      of_video[shot.number] = step;
-      continue;
-    }
-    progress.ThrowIfInterrupted();
-    take(step, io::ReadImage(shot.file));
+    if (wanted(step)) shots[step] = &layout_.shots[steps_[step].shots[camera]];
   }
-  if (of_video.empty()) return;
-  const RigShot& shot = layout_.shots[steps_.front().shots[camera]];
-  capture::VideoReader video(shot.file);
-  while (!of_video.empty() && video.Next()) {
-    progress.ThrowIfInterrupted();
-    const auto found = of_video.find(video.number());
-    if (found == of_video.end()) continue;
-    take(found->second, video.Picture());
-    of_video.erase(found);
-  }
-  if (of_video.empty()) return;
-  throw Error(fmt::format("{}: frame {}: cannot be decoded a second time; is the file changing?",
-                          shot.file.string(), of_video.begin()->first));
+  HandOut(shots, take, progress);
 }
 
 }  // namespace dtr::pipeline

@@ -29,17 +29,29 @@ struct RecordedStep {
 };
 
 /// A folder of one video or one folder of photos per camera, or of photos named by their cameras
-/// (RigLayoutOf). Time steps that a camera has no image of are left out, with a note.
+/// (RigLayoutOf). Of videos of different rates, frames are those nearest to the slowest one's, with
+/// a note. Time steps that a camera has no image of are left out, with a note.
 class Recording {
  public:
   /// Throws as RigLayoutOf; UsageError for a choice that leaves nothing, Error where no time step
   /// has an image of every camera.
   Recording(const std::filesystem::path& folder, const StepChoice& choice, Progress& progress);
 
+  /// Takes time steps again, each camera's image `later` frames after the one of equal number; one
+  /// number per camera. Choice, notes and errors as above.
+  void Shift(const std::vector<int>& later, Progress& progress);
+
   const std::vector<std::string>& cameras() const { return layout_.cameras; }
   const std::vector<RecordedStep>& steps() const { return steps_; }
   /// Everything that is read, for a fingerprint: files, each once.
   std::vector<std::filesystem::path> Files() const;
+
+  /// Hands out a camera's images of at most `most` consecutive frames from the first time step on,
+  /// time steps or not, in rising order; `frame` counts from there, with gaps where one is missing.
+  /// Throws as ForEach.
+  void ForEachFrame(size_t camera, size_t most,
+                    const std::function<void(size_t frame, const ImageRgb8& image)>& take,
+                    const Progress& progress) const;
 
   /// Hands out the images of one camera at the time steps that are wanted, in rising order. Videos
   /// are decoded up to the last of them, one image in memory. Throws Error where one cannot be
@@ -50,7 +62,9 @@ class Recording {
 
  private:
   std::filesystem::path folder_;
+  StepChoice choice_;
   RigLayout layout_;
+  double steps_per_second_ = 0;
   std::vector<RecordedStep> steps_;
 };
 
