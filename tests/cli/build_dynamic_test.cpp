@@ -120,19 +120,23 @@ TEST_F(BuildDynamic, VideosGiveTheSameSetAsPhotos) {
   }
 }
 
+void MakeToys(const std::string& folder, const std::vector<std::string>& more) {
+  std::vector<std::string> words{
+      "dataset", "make",     "toys", "-o",      folder, "--views",         "5", "--width",
+      "120",     "--height", "80",   "--noise", "1",    "--supersampling", "1"};
+  words.insert(words.end(), more.begin(), more.end());
+  DtrOk(words);
+}
+
 TEST_F(BuildDynamic, OfFasterVideosTheFramesNearestInTimeAreTaken) {
   if (FindProgram("ffmpeg").empty()) GTEST_SKIP() << "SKIPPED: no program ffmpeg";
-  fs::create_directories(At("rates"));
-  for (const std::string fps : {"10", "25"}) {
-    DtrOk({"dataset", "make", "toys", "-o", At("at" + fps), "--views", "2", "--steps",
-           fps == "10" ? "5" : "12", "--width", "48", "--height", "32", "--supersampling", "1",
-           "--videos", "--fps", fps});
-    const std::string camera = fps == "10" ? "cam00.mkv" : "cam01.mkv";
-    fs::copy_file(At("at" + fps + "/videos/" + camera), At("rates/" + camera));
-  }
-  DtrOk({"dataset", "make", "toys", "-o", At("stills"), "--views", "2", "--steps", "12", "--width",
-         "48", "--height", "32", "--supersampling", "1", "--fps", "25"});
-  const Ran ran = DtrOk({"build", At("rates"), "--dynamic", "--rig", At("at10/rig.json"),
+  MakeToys(At("slow"), {"--steps", "5", "--fps", "10", "--videos"});
+  MakeToys(At("fast"), {"--steps", "12", "--fps", "25", "--videos"});
+  MakeToys(At("stills"), {"--steps", "12", "--fps", "25"});
+  fs::copy_file(At("fast/videos/cam01.mkv"), At("slow/videos/cam01.mkv"),
+                fs::copy_options::overwrite_existing);
+  fs::remove(At("slow/videos/timestamps.csv"));  // which states the frames of each time step
+  const Ran ran = DtrOk({"build", At("slow/videos"), "--dynamic", "--rig", At("slow/rig.json"),
                          "--engine", "none", "-o", At("rates.dtr")});
   EXPECT_THAT(ran.err, HasSubstr("cam00.mkv: 10.000 frames per second, cam01.mkv: 25.000"));
   const DtrSet set = io::LoadSet(At("rates.dtr"));
@@ -147,8 +151,7 @@ TEST_F(BuildDynamic, OfFasterVideosTheFramesNearestInTimeAreTaken) {
 
 // Photos of 24 time steps; in `apart` two cameras began at other times than the rest.
 void MakePhotosWithClocksApart(const std::string& toys, const std::string& apart) {
-  DtrOk({"dataset", "make", "toys", "-o", toys, "--views", "5", "--steps", "24", "--width", "120",
-         "--height", "80", "--noise", "1", "--supersampling", "1"});
+  MakeToys(toys, {"--steps", "24"});
   for (int camera = 0; camera < 5; ++camera) {
     const std::string folder = fmt::format("/cam0{}/", camera);
     const int later = camera == 1 ? 3 : camera == 3 ? -2 : 0;
@@ -161,8 +164,8 @@ void MakePhotosWithClocksApart(const std::string& toys, const std::string& apart
 }
 
 TEST_F(BuildDynamic, ClocksThatDifferAreFoundFromWhatMoves) {
-  MakePhotosWithClocksApart(At("clocks"), At("apart"));
-  const Ran ran = DtrOk({"build", At("apart"), "--dynamic", "--clocks", "free", "--rig",
+  MakePhotosWithClocksApart(At("clocks"), At("clocks-apart"));
+  const Ran ran = DtrOk({"build", At("clocks-apart"), "--dynamic", "--clocks", "free", "--rig",
                          At("clocks/rig.json"), "--engine", "none", "-o", At("apart.dtr")});
   EXPECT_THAT(ran.err, HasSubstr("clocks: frames later than those of cam00"));
   const DtrSet set = io::LoadSet(At("apart.dtr"));
@@ -192,7 +195,7 @@ TEST_F(BuildDynamic, ClocksOfAStillSceneAreRejected) {
     }
   }
   ExpectRejected(Dtr({"build", At("still"), "--dynamic", "--clocks", "free", "--rig",
-                      At("toys/rig.json"), "-o", At("none.dtr")}),
+                      At("toys/rig.json"), "-o", At("still.dtr")}),
                  kFailed, "clocks: camera cam01: expected motion that it and another camera see");
 }
 
@@ -331,7 +334,7 @@ TEST_F(BuildDynamic, CamerasOfAnotherSizeAreNamed) {
   ExpectRejected(Dtr(Build("mixed.dtr", {}, "mixed")), kFailed,
                  "camera cam00, time step 0002: expected 160 x 108 px as its other images, found "
                  "80 x 54");
-  ExpectRejected(Dtr(Build("none.dtr", {"--clocks", "free"}, "mixed")), kFailed,
+  ExpectRejected(Dtr(Build("mixed-free.dtr", {"--clocks", "free"}, "mixed")), kFailed,
                  "camera cam00: expected 160 x 108 px as it was calibrated with, found 80 x 54");
 }
 
