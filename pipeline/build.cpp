@@ -484,6 +484,8 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& progress) {
   const auto start = std::chrono::steady_clock::now();
   try {
     BuildOrPart(options, progress);
+    throw std::logic_error(
+        "BuildSet: no stage ended as a part");  // nothing may be recorded as done
   } catch (const PartDone&) {
   }
   const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
