@@ -170,7 +170,11 @@ std::optional<PairShift> ShiftOfPair(const MotionSeen& a, const MotionSeen& b,
   const auto motion_a = MotionByPlane(a, angles_a, low, high);
   const auto motion_b = MotionByPlane(b, angles_b, low, high);
   const int frames = static_cast<int>(std::max(motion_a.size(), motion_b.size()));
-  const int fewest = std::max(kFewestFrames, frames / 2);
+  const auto known = [](const auto& motion) {
+    return static_cast<int>(std::count_if(motion.begin(), motion.end(),
+                                          [](const auto& planes) { return planes.has_value(); }));
+  };
+  const int fewest = std::max(kFewestFrames, std::min(known(motion_a), known(motion_b)) / 2);
   std::map<int, double> scores;
   for (int shift = -frames; shift <= frames; ++shift) {
     if (const auto score = Correlation(motion_a, motion_b, shift, fewest)) scores[shift] = *score;

@@ -28,11 +28,11 @@ struct MotionClock {
 
 /// Finds the clocks of cameras that run at one rate by epipolar consistency. What moves in a plane
 /// through the centres of two cameras moves both of its lines, so each camera's motion per plane
-/// and frame is correlated with the other's, over all shifts in time that leave half of the frames
-/// (at least kFewestFrames) in common. Shifts of pairs, to fractions of a frame by a parabola, are
-/// then joined by least squares, those that contradict better ones by more than a frame left out.
-/// Motion barcodes: Ben-Artzi, Halperin, Werman and Peleg 2016 ("Epipolar geometry based on line
-/// similarity"); theirs are binary and find the geometry, these know it.
+/// and frame is correlated with the other's, over all shifts in time that leave half of the
+/// shorter recording (at least kFewestFrames) in common. Shifts of pairs, to fractions of a frame
+/// by a parabola, are then joined by least squares, those that contradict better ones by more than
+/// a frame left out. Motion barcodes: Ben-Artzi, Halperin, Werman and Peleg 2016 ("Epipolar
+/// geometry based on line similarity"); theirs are binary and find the geometry, these know it.
 ///
 /// The same for any number of threads. Throws Error naming a camera that shares no unambiguous
 /// motion with the others (nothing moved, it moved periodically, or clocks are farther apart), and

@@ -194,10 +194,12 @@ void Recording::ForEachFrame(size_t camera, size_t most,
                              const std::function<void(size_t, const ImageRgb8&)>& take,
                              const Progress& progress) const {
   const ShotsByTime shots = ShotsOf(layout_);
-  const RigShot& first = layout_.shots[steps_.front().shots.front()];
-  const size_t from = FrameTimes(layout_.frames)[static_cast<size_t>(
-      std::find(layout_.frames.begin(), layout_.frames.end(), first.frame) -
-      layout_.frames.begin())];
+  size_t from = 0;
+  if (shots.rbegin()->first >= most) {
+    const std::string& first = layout_.shots[steps_.front().shots.front()].frame;
+    const auto at = std::find(layout_.frames.begin(), layout_.frames.end(), first);
+    from = FrameTimes(layout_.frames)[static_cast<size_t>(at - layout_.frames.begin())];
+  }
   std::map<size_t, const RigShot*> wanted;
   for (auto then = shots.lower_bound(from); then != shots.end(); ++then) {
     if (then->first - from >= most) break;

@@ -46,8 +46,9 @@ class Recording {
   /// Everything that is read, for a fingerprint: files, each once.
   std::vector<std::filesystem::path> Files() const;
 
-  /// Hands out a camera's images of at most `most` consecutive frames from the first time step on,
-  /// time steps or not, in rising order; `frame` counts from there, with gaps where one is missing.
+  /// Hands out a camera's images of at most `most` consecutive frames, time steps or not, in rising
+  /// order: all, or where there are more those from the first time step on. `frame` counts from the
+  /// first of any camera, with gaps where one is missing.
   /// Throws as ForEach.
   void ForEachFrame(size_t camera, size_t most,
                     const std::function<void(size_t frame, const ImageRgb8& image)>& take,
