@@ -80,7 +80,8 @@ void ReadBuildWords(const std::vector<std::string>& words, const CommonOptions& 
   }
   if (arguments.is_dynamic) {
     throw UsageError(
-        "batch: time steps of a dynamic set follow each other and are one job; use dtr build");
+        "batch: time steps of a dynamic set follow each other; use dtr build, of parts (--from, "
+        "--to) that dtr join joins");
   }
   FinishBuildArguments(all, arguments);
   options.build = arguments.options;

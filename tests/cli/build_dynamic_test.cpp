@@ -297,6 +297,36 @@ TEST_F(BuildDynamic, TakesTheTimeStepsThatAreChosen) {
   EXPECT_DOUBLE_EQ(set.frames[1].time_s, 2.0 / 24);
 }
 
+TEST_F(BuildDynamic, PartsOfARecordingAreJoinedWithStillDepthOnce) {
+  const auto build = [](const std::string& set, const std::vector<std::string>& steps) {
+    std::vector<std::string> words = Build(set, steps);
+    std::erase(words, "--no-completion");
+    DtrOk(words);
+  };
+  build("early.dtr", {"--to", "2", "--fps", "10"});
+  build("late.dtr", {"--from", "1", "--fps", "10"});
+  DtrOk({"join", At("early.dtr"), At("late.dtr"), "-o", At("parts.dtr"), "--video", "lossless"});
+  const Json info = Json::parse(DtrOk({"info", At("parts.dtr"), "--verify", "--json", "-"}).out);
+  EXPECT_EQ(info["frames"], 6);
+  io::LoadOptions all;
+  all.sigma = all.held_out = all.completed = true;
+  const DtrSet joined = io::LoadSet(At("parts.dtr"), all);
+  ASSERT_EQ(joined.frames.size(), 6u);
+  for (size_t step = 0; step < joined.frames.size(); ++step) {
+    const DtrSet part = io::LoadSet(At(step < 3 ? "early.dtr" : "late.dtr"), all);
+    EXPECT_NEAR(joined.frames[step].time_s, 0.1 * static_cast<double>(step), 1e-12);
+    for (size_t c = 0; c < 5; ++c) {
+      const View &view = joined.frames[step].views[c], &own = part.frames[step % 3].views[c];
+      EXPECT_EQ(view.id, fmt::format("t000{}_cam0{}", step, c));
+      EXPECT_EQ(view.image, own.image);
+      EXPECT_EQ(view.depth.grid(), own.depth.grid());
+      EXPECT_EQ(view.depth_base.has_value(), c != 2);  // the held-out one has no depth
+      EXPECT_EQ(view.depth_state.data(), own.depth_state.data());
+      EXPECT_EQ(view.mesh_file.has_value(), c != 2);
+    }
+  }
+}
+
 TEST_F(BuildDynamic, TruthOfEveryTimeStepIsNeeded) {
   ExpectRejected(Dtr({"evaluate", At("set.dtr"), "--renderer", "cpu", "--depth", At("nothing")}),
                  kWrongUsage,

@@ -134,8 +134,6 @@ TEST_F(DynamicSet, WhatKnowsStillScenesAloneSaysSo) {
                  2, "--play: expected --like or --camera with it");
   ExpectRejected(Dtr({"export", Set(), "-o", At("colmap")}), 1,
                  "export to COLMAP: expected a set with one frame, found 2");
-  ExpectRejected(Dtr({"join", Set(), Set(), "-o", At("again.dtr")}), 2,
-                 "expected a set of one frame, found 2");
   ExpectRejected(Dtr({"dataset", "make", "plane", "-o", At("p"), "--time", "1"}), 2,
                  "where nothing moves");
 }
