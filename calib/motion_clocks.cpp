@@ -258,10 +258,24 @@ std::vector<double> Joined(const std::vector<PairShift>& agreeing, size_t camera
   return later;
 }
 
+void RequireMotion(const std::vector<MotionSeen>& cameras) {
+  if (cameras.size() < 2) throw std::invalid_argument("FindMotionClocks: fewer than two cameras");
+  for (const MotionSeen& camera : cameras) {
+    const Grid<float>* first = nullptr;
+    for (const Grid<float>& cells : camera.cells) {
+      if (cells.empty()) continue;
+      if (first == nullptr) first = &cells;
+      if (cells.width() != first->width() || cells.height() != first->height()) {
+        throw std::invalid_argument("FindMotionClocks: cells of different sizes");
+      }
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<MotionClock> FindMotionClocks(const std::vector<MotionSeen>& cameras, int threads) {
-  if (cameras.size() < 2) throw std::invalid_argument("FindMotionClocks: fewer than two cameras");
+  RequireMotion(cameras);
   const std::vector<PairShift> shifts = ShiftsOfPairs(cameras, threads);
   const auto by_best = ByBestPairs(shifts, cameras.size());
   RequireAllJoined(by_best, cameras);
