@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
 #include <stdexcept>
 
@@ -13,6 +14,9 @@ namespace {
 // Photos that were taken from different places have two thirds and more of their matches explained;
 // of a camera that only turned, what noise gives a depth: a fiftieth.
 constexpr double kMinExplained = 0.2;
+// A focal length that is farther from the one that pairs agree on than their vote ever erred: of
+// photos of two zoom settings one lens with strong distortion may explain both.
+constexpr double kMaxFocalFactor = 2;
 
 MapCameras CamerasOf(const ViewGraph& graph, const calib::SfmModel& model, int threads) {
   std::map<std::string, size_t> index;
@@ -56,6 +60,21 @@ std::vector<MapPoint> PointsOfModel(const ViewGraph& graph, const calib::SfmMode
   return list;
 }
 
+std::string WhyNotFocalOfPairs(const ViewGraph& graph, const MapCameras& cameras) {
+  for (size_t i = 0; i < graph.images.size(); ++i) {
+    const auto c = static_cast<size_t>(graph.images[i].camera);
+    if (!cameras.placed[i] || !graph.focal_is_known[c]) continue;
+    const double f = cameras.lenses[c].params[0], known = graph.cameras[c].params[0];
+    if (std::max(f / known, known / f) <= kMaxFocalFactor) continue;
+    return fmt::format(
+        "the focal length of camera {} became {:.0f} px, where pairs of its photos agree on "
+        "{:.0f} px: photos of several cameras or zoom settings need intrinsics of their own "
+        "(--camera-per folder or photo)",
+        c + 1, f, known);
+  }
+  return "";
+}
+
 // Share of the matches between images of the model whose two features see one point of it.
 double ExplainedShare(const ViewGraph& graph, const MapCameras& cameras,
                       std::span<const MapPoint> points) {
@@ -97,6 +116,7 @@ std::string WhyContradicted(const ViewGraph& graph, const calib::SfmModel& model
   if (explained < kMinExplained) {
     return fmt::format("only {:.0f} % of the matches became points", 100 * explained);
   }
+  if (std::string why = WhyNotFocalOfPairs(graph, cameras); !why.empty()) return why;
   const MapEvidence evidence{graph, cameras, points, {}};
   MapStatistics statistics;
   if (std::string why = WhyNotContradicted(evidence, &statistics); !why.empty()) return why;

@@ -286,6 +286,10 @@ TEST(WhyContradicted, AModelOfTheMatchesPassesAndOneOfMixedUpPhotosDoesNot) {
   without_points.points.clear();
   EXPECT_THAT(WhyContradicted(seen.graph, without_points, 1),
               ::testing::HasSubstr("only 0 % of the matches became points"));
+  ViewGraph zoomed = seen.graph;
+  zoomed.focal_is_known[0] = 1;
+  zoomed.cameras[0].params[0] *= 2.2;
+  EXPECT_THAT(WhyContradicted(zoomed, model, 1), ::testing::HasSubstr("--camera-per"));
   model.images[0].name = "another.jpg";
   EXPECT_THROW(WhyContradicted(seen.graph, model, 1), std::invalid_argument);
 }
