@@ -53,9 +53,11 @@ CLI::Option* AddSfmOptions(CLI::App& command, pipeline::SfmChoice& choice) {
       ->type_name("auto|exhaustive|preselected|sequential");
   command
       .add_option("--lens-model", choice.lens_model,
-                  "Distortion that SfM starts with, by COLMAP's names [RADIAL]")
-      ->check(CLI::IsMember({"SIMPLE_RADIAL", "RADIAL", "OPENCV"}))
-      ->type_name("SIMPLE_RADIAL|RADIAL|OPENCV");
+                  "Distortion that SfM starts with, by COLMAP's names: SIMPLE_RADIAL, RADIAL, "
+                  "OPENCV, of a fisheye RADIAL_FISHEYE or OPENCV_FISHEYE [RADIAL]")
+      ->check(
+          CLI::IsMember({"SIMPLE_RADIAL", "RADIAL", "OPENCV", "RADIAL_FISHEYE", "OPENCV_FISHEYE"}))
+      ->type_name("MODEL");
   std::map<std::string, pipeline::CameraPer> sharing;
   for (const auto per : {pipeline::CameraPer::kAuto, pipeline::CameraPer::kFolder,
                          pipeline::CameraPer::kPhoto, pipeline::CameraPer::kSet}) {

@@ -22,6 +22,8 @@
 namespace dtr::datasets {
 namespace {
 
+RadialLens LensOf(const DatasetSpec& spec) { return {spec.k1, spec.k2, spec.fisheye}; }
+
 namespace fs = std::filesystem;
 
 constexpr int kMaxViews = 10000;  // names have four digits
@@ -63,7 +65,7 @@ std::string SourceText(const DatasetSpec& spec) {
          "Made by `dtr dataset make` (ray cast, analytic surfaces, procedural texture: no "
          "downloaded asset); the recipe is dataset.json.\n"
          "- `images/`: photos" +
-         (spec.k1 != 0 || spec.k2 != 0 ? ", with the lens distortion of dataset.json" : "") +
+         (!LensOf(spec).IsIdeal() ? ", with the lens distortion of dataset.json" : "") +
          ". `cameras.json`: ideal pinhole cameras, exact.\n"
          "- `depth/`: plane z at pixel centres of the pinhole grid, float32, 0 = nothing hit.\n"
          "- `masks/`: `_visible` seen by at least 2 other views (exact), `_texture` standard "
@@ -146,16 +148,16 @@ void CheckSpec(const DatasetSpec& spec) {
   const double length_s = static_cast<double>(spec.steps - 1) / spec.steps_per_second;
   CheckRange("time", spec.time_s, -limit_s, limit_s);
   CheckRange("time of the last step", spec.time_s + length_s, -limit_s, limit_s);
-  if (spec.panoramas && (spec.width_px % 2 != 0 || spec.k1 != 0 || spec.k2 != 0)) {
+  if (spec.panoramas && (spec.width_px % 2 != 0 || !LensOf(spec).IsIdeal())) {
     throw UsageError(
         "panoramas: expected an even width and no lens distortion; the views have none");
   }
   CheckRange("JPEG quality", spec.jpeg_quality, 1, 100);
   if (spec.steps == 1) return;
-  if (spec.panoramas || spec.k1 != 0 || spec.k2 != 0 || spec.exposure_drift != 0) {
+  if (spec.panoramas || !LensOf(spec).IsIdeal() || spec.exposure_drift != 0) {
     throw UsageError(
         "steps: expected pinhole cameras of one exposure for several time steps; leave out "
-        "`panoramas`, `k1`, `k2` and `exposure_drift`");
+        "`panoramas`, `k1`, `k2`, `fisheye` and `exposure_drift`");
   }
 }
 
@@ -164,7 +166,7 @@ PhotoOptions PhotoOptionsOf(const DatasetSpec& spec, int i, std::uint64_t noise_
   options.supersampling = spec.supersampling;
   options.noise_sigma = spec.noise;
   options.gain = ExposureGain(spec.exposure_drift, i, spec.views);
-  options.lens = {spec.k1, spec.k2};
+  options.lens = LensOf(spec);
   options.seed = noise_seed;
   options.threads = threads;
   return options;
@@ -232,7 +234,7 @@ void MakeDataset(const DatasetSpec& given, const fs::path& given_folder, int thr
 
   // A lens that folds over is rejected here, before any file is written.
   PhotoOptions probe;
-  probe.lens = {spec.k1, spec.k2};
+  probe.lens = LensOf(spec);
   CheckPhotoOptions(MakeCamera(spec.width_px, spec.height_px, spec.focal_35mm), probe);
 
   WorkFolder work(WorkFolder::Of(out_folder), "dataset");

@@ -22,6 +22,7 @@ struct DatasetSpec {
   double noise = 0;           ///< std. deviation, 8-bit levels
   double exposure_drift = 0;  ///< stops from the first photo to the last; the middle has gain 1
   double k1 = 0, k2 = 0;      ///< lens of the photos (datasets/render_truth.h, RadialLens)
+  bool fisheye = false;       ///< it is a fisheye
   std::uint64_t seed = 1;     ///< of textures and noise
   /// The written world: p_written = scale * p_scene + world_offset. Photos and masks are rendered
   /// in the scene's own frame and do not depend on either, to the byte; written poses and depths

@@ -96,13 +96,18 @@ double UndistortedRadius(const RadialLens& lens, double distorted, double monoto
   return r;
 }
 
-/// Ray (z = 1) of a pixel of the distorted photo.
+/// Ray (z = 1; of a fisheye of length 1) of a pixel of the distorted photo.
 Vector3d RayOfPhotoPixel(const PinholeCamera& camera, const RadialLens& lens, double monotone,
                          const Vector2d& pixel) {
   const Vector3d distorted = camera.RayFromPixel(pixel);
   if (lens.IsIdeal()) return distorted;
   const double radius = distorted.head<2>().norm();
   if (radius == 0) return distorted;
+  if (lens.fisheye) {
+    const double angle = UndistortedRadius(lens, radius, monotone);
+    const Vector2d across = distorted.head<2>() * (std::sin(angle) / radius);
+    return {across.x(), across.y(), std::cos(angle)};
+  }
   const double factor = UndistortedRadius(lens, radius, monotone) / radius;
   return {distorted.x() * factor, distorted.y() * factor, 1.0};
 }
@@ -139,14 +144,16 @@ void CheckPhotoOptions(const PinholeCamera& camera, const PhotoOptions& options)
     throw UsageError("lens distortion: expected finite k1, k2, found " + std::to_string(lens.k1) +
                      ", " + std::to_string(lens.k2));
   }
-  const double limit = MonotoneRadius(lens);
+  const double folds = MonotoneRadius(lens);
+  const double limit = lens.fisheye ? std::min(folds, std::numbers::pi) : folds;
   if (std::isinf(limit)) return;
   for (const double x : {0.0, static_cast<double>(camera.width_px())}) {
     for (const double y : {0.0, static_cast<double>(camera.height_px())}) {
       if (camera.RayFromPixel({x, y}).head<2>().norm() >= DistortedRadius(lens, limit)) {
         throw UsageError("lens distortion: k1 " + std::to_string(lens.k1) + ", k2 " +
                          std::to_string(lens.k2) +
-                         " fold the image over before its corners; take smaller ones");
+                         " fold the image over before its corners; take smaller ones, or a longer "
+                         "focal length");
       }
     }
   }

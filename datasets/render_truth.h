@@ -13,10 +13,12 @@
 namespace dtr::datasets {
 
 /// Radial lens distortion (Brown 1971; COLMAP's RADIAL): with x, y = ray / z and r^2 = x^2 + y^2,
-/// pixel = principal point + focal * (1 + k1 r^2 + k2 r^4) * (x, y).
+/// pixel = principal point + focal * (1 + k1 r^2 + k2 r^4) * (x, y). Of a fisheye (Kannala & Brandt
+/// 2006; COLMAP's RADIAL_FISHEYE) (x, y) has the ray's direction and r is its angle.
 struct RadialLens {
   double k1 = 0, k2 = 0;
-  bool IsIdeal() const { return k1 == 0 && k2 == 0; }
+  bool fisheye = false;
+  bool IsIdeal() const { return k1 == 0 && k2 == 0 && !fisheye; }
 };
 
 /// How a photo is taken.
@@ -29,7 +31,8 @@ struct PhotoOptions {
   int threads = 0;         ///< 0: all cores; the image does not depend on it
 };
 
-/// Throws UsageError for options out of range, or a lens that folds over inside the image.
+/// Throws UsageError for options out of range, or a lens that folds over inside the image, or a
+/// fisheye of 360 degrees and more.
 void CheckPhotoOptions(const PinholeCamera& camera, const PhotoOptions& options);
 
 /// Linear light that reaches each pixel, shape (height, width, 3), before exposure and noise: the

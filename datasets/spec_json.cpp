@@ -13,6 +13,7 @@ using Json = nlohmann::ordered_json;
 
 // Grows when the same spec begins to give other images.
 constexpr int kGeneratorVersion = 1;
+constexpr char kFisheye[] = "RADIAL_FISHEYE";
 
 // The beginning of a wrong value, whatever its strings hold.
 std::string Shown(const Json& value) {
@@ -61,7 +62,7 @@ std::string FormatSpecJson(const DatasetSpec& spec) {
   json["supersampling"] = spec.supersampling;
   json["noise_levels"] = spec.noise;
   json["exposure_drift_stops"] = spec.exposure_drift;
-  json["lens"] = {{"model", "RADIAL"}, {"k1", spec.k1}, {"k2", spec.k2}};
+  json["lens"] = {{"model", spec.fisheye ? kFisheye : "RADIAL"}, {"k1", spec.k1}, {"k2", spec.k2}};
   json["seed"] = spec.seed;
   json["world_offset"] = {spec.world_offset.x(), spec.world_offset.y(), spec.world_offset.z()};
   json["scale"] = spec.scale;
@@ -99,6 +100,7 @@ DatasetSpec ParseSpecJson(const std::string& text, const std::string& source) {
   spec.noise = NumberOf(json, "noise_levels", source);
   spec.exposure_drift = NumberOf(json, "exposure_drift_stops", source);
   const Json lens = FieldOf<Json>(json, "lens", &Json::is_object, "an object", source);
+  spec.fisheye = lens.value("model", Json()) == kFisheye;
   spec.k1 = NumberOf(lens, "k1", source);
   spec.k2 = NumberOf(lens, "k2", source);
   spec.seed = FieldOf<std::uint64_t>(json, "seed", &Json::is_number_unsigned,

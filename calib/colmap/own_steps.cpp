@@ -11,6 +11,7 @@
 #include "calib/colmap/feature_parts.h"
 #include "calib/colmap/graph_database.h"
 #include "calib/colmap/point_colours.h"
+#include "calib/models/fisheye.h"
 #include "calib/sfm/features/sift.h"
 #include "calib/sfm/mapping/global_mapper.h"
 #include "calib/sfm/matching/match_photos.h"
@@ -27,6 +28,7 @@ namespace {
 
 // Where EXIF says nothing, of the long side: a moderate wide angle, as COLMAP assumes.
 constexpr double kGuessedFocal = 1.2;
+constexpr double kGuessedFisheyeFocal = 0.4;  // 150 degrees on the long side
 // Of the memory, for descriptors; matches and what they are copied to take the rest.
 constexpr double kDescriptorShare = 0.5;
 
@@ -111,7 +113,8 @@ GroupLenses LensesOf(const Workspace& workspace, const std::vector<CameraGroup>&
   GroupLenses known;
   for (const CameraGroup& group : groups) {
     const SfmImageInput& first = workspace.images()[group.images.front()];
-    const double guess_px = kGuessedFocal * std::max(first.width_px, first.height_px);
+    const double guess_px = (calib::IsFisheye(group.model) ? kGuessedFisheyeFocal : kGuessedFocal) *
+                            std::max(first.width_px, first.height_px);
     known.lenses.push_back(
         {group.model, first.width_px, first.height_px,
          group.params.empty() ? FirstGuess(group.model, first, guess_px) : group.params});

@@ -61,6 +61,8 @@ void DeclareMakeOptions(CLI::App& command, MakeOptions& options) {
   command.add_option("--width", options.width_px, "Photo width [960; toys 320]")->type_name("PX");
   command.add_option("--height", options.height_px, "Photo height [640; toys 216]")
       ->type_name("PX");
+  command.add_option("--focal", spec.focal_35mm, "Focal length of a frame 36 mm wide, mm [28]")
+      ->type_name("MM");
   command
       .add_option("--steps", options.steps,
                   "Time steps, of scenes that move: photos of every camera, rig.json and truth "
@@ -83,6 +85,9 @@ void DeclareMakeOptions(CLI::App& command, MakeOptions& options) {
                      "Stops from the first photo to the last [0]");
   command.add_option("--k1", spec.k1, "Radial lens distortion of the photos [0]");
   command.add_option("--k2", spec.k2, "Second radial coefficient [0]");
+  command.add_flag("--fisheye", spec.fisheye,
+                   "Photos of a fisheye: equidistant, --k1 and --k2 are of the angle; --focal 11.5 "
+                   "sees 180 degrees");
   command.add_option("--world-offset", options.offset, "Where the written world has its origin")
       ->expected(3)
       ->type_name("X Y Z");

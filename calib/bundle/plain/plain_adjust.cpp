@@ -26,7 +26,9 @@ void CheckPlain(const Bundle& bundle, const PlainOptions& options, const std::ve
     RejectPlain("a list of what is fixed or used must have an entry for each");
   }
   if (!std::all_of(bundle.lenses.begin(), bundle.lenses.end(), IsPlain)) {
-    RejectPlain("only perspective camera models up to OPENCV can be adjusted without Ceres");
+    RejectPlain(
+        "only perspective camera models up to OPENCV and radial fisheyes can be adjusted without "
+        "Ceres");
   }
   if (options.principal_point_sigma_px > 0 && !options.free_poses) {
     RejectPlain("principal points per image: expected poses that may move");

@@ -1,5 +1,6 @@
 // calib/bundle/plain/plain_adjust.h -- bundle adjustment with derivatives and elimination by hand,
-// for the plain problem: perspective camera models up to OPENCV, no known positions or distances.
+// for the plain problem: camera models up to OPENCV and radial fisheyes, no known positions or
+// distances.
 #pragma once
 #include <vector>
 

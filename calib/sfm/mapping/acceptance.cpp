@@ -7,6 +7,7 @@
 #include <numeric>
 #include <unordered_map>
 
+#include "calib/models/fisheye.h"
 #include "dtr/base/order_statistics.h"
 
 namespace dtr::sfm {
@@ -19,6 +20,7 @@ constexpr int kStrongMatches = 30;  // a pair that verification did not find by 
 constexpr double kMaxMedianPx = 1.5, kMaxRmsPx = 2.5;  // of 1000 px
 constexpr double kMaxRotationMisfit = 1.5;             // median; 1 is what the certainties promise
 constexpr double kMinFocal = 0.35, kMaxFocal = 12;     // of the long side: 110 and 5 degrees
+constexpr double kMinFisheyeFocal = 0.15;              // a circle of 190 degrees in half of it
 constexpr double kMaxFocalChange = 1.35;               // where it was known
 constexpr double kAgreePx = 6, kContradictedBelow = 0.4;
 constexpr double kMaxContradicted = 0.05, kMaxContradictedOfImage = 0.4;
@@ -42,7 +44,8 @@ std::string WhyNotFocal(const MapEvidence& evidence) {
     if (!used[c]) continue;
     const calib::LensCamera& lens = evidence.cameras.lenses[c];
     const double f = lens.params[0], side = std::max(lens.width_px, lens.height_px);
-    if (!(f > kMinFocal * side && f < kMaxFocal * side)) {
+    const double least = calib::IsFisheye(lens.model) ? kMinFisheyeFocal : kMinFocal;
+    if (!(f > least * side && f < kMaxFocal * side)) {
       return fmt::format(
           "the focal length of camera {} became {:.0f} px, {:.2f} times the long side", c + 1, f,
           f / side);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <span>
 
 #include "dtr/base/parallel_for.h"
 
@@ -16,6 +17,10 @@ constexpr double kGridScale = 3.0 / 1600, kScale = 1.0 / 1600;
 constexpr int kFocals = 17;
 constexpr double kLowestFocal = 0.4, kHighestFocal = 4;
 constexpr double kK1s[] = {-0.3, -0.18, -0.08, 0, 0.1};
+// Of a fisheye: 180 degrees on the long side are 0.32; coefficients are of the angle.
+constexpr double kLowestFisheye = 0.15, kHighestFisheye = 1.5;
+constexpr double kFisheyeK1s[] = {-0.12, -0.06, 0, 0.06};
+constexpr double kFarthestOffAxis = 1.4;  // rad; farther off, the plane z = 1 magnifies 30 times
 // Weak priors keep what matches leave open in the ordinary; noise is in units of the scale.
 constexpr double kPriorNoise = 0.3, kLogFocalDeviation = 0.5, kK1Deviation = 0.15;
 constexpr int kSteps = 25;
@@ -68,6 +73,7 @@ Posed Refined(const Unbending& matches, const RelativePose& start, double scale,
 }
 
 RelativePose FromFundamental(const VotePair& pair, const VoteLens& lens, const Unbending& matches) {
+  if (lens.fisheye) return PoseFromEssential(pair.fundamental, matches.points, {});
   const Eigen::Vector3d k(lens.focal, lens.focal, 1);
   return PoseFromEssential(k.asDiagonal() * pair.fundamental * k.asDiagonal(), matches.points, {});
 }
@@ -89,14 +95,17 @@ std::vector<Posed> OverLenses(const VotePair& pair, const std::vector<VoteLens>&
 
 std::vector<VoteLens> Grid(const VoteOptions& options) {
   std::vector<VoteLens> lenses;
-  const double step = std::log(kHighestFocal / kLowestFocal) / (kFocals - 1);
-  for (const double k1 : kK1s) {
+  const bool fisheye = options.fisheye;
+  const double lowest = fisheye ? kLowestFisheye : kLowestFocal;
+  const double step =
+      std::log((fisheye ? kHighestFisheye : kHighestFocal) / lowest) / (kFocals - 1);
+  for (const double k1 : fisheye ? std::span<const double>(kFisheyeK1s) : kK1s) {
     if (options.k1_is_fixed && k1 != 0) continue;
     if (options.focal_is_fixed) {
-      lenses.push_back({options.prior_focal, k1});
+      lenses.push_back({options.prior_focal, k1, fisheye});
       continue;
     }
-    for (int i = 0; i < kFocals; ++i) lenses.push_back({kLowestFocal * std::exp(step * i), k1});
+    for (int i = 0; i < kFocals; ++i) lenses.push_back({lowest * std::exp(step * i), k1, fisheye});
   }
   return lenses;
 }
@@ -122,7 +131,7 @@ Reduced ReducedOf(const Normal& n) {
 }
 
 VoteLens Stepped(const VoteLens& lens, double log_focal, double k1) {
-  return {lens.focal * std::exp(log_focal), lens.k1 + k1};
+  return {lens.focal * std::exp(log_focal), lens.k1 + k1, lens.fisheye};
 }
 
 Normal NormalOf(const VotePair& pair, const VoteLens& lens, const RelativePose& pose) {
@@ -325,8 +334,14 @@ std::optional<Eigen::Vector2d> Unbent(const VoteLens& lens, const Eigen::Vector2
     if (std::abs(step) < 1e-13) break;
   }
   if (!std::isfinite(r)) return std::nullopt;
-  const double tangential = 1 / (1 + lens.k1 * r * r), radial = 1 / (1 + 3 * lens.k1 * r * r);
+  double tangential = 1 / (1 + lens.k1 * r * r), radial = 1 / (1 + 3 * lens.k1 * r * r);
   if (!(radial > 0) || !(tangential > 0)) return std::nullopt;
+  if (lens.fisheye && r > 0) {  // r is the angle; its tangent is on the plane
+    if (r > kFarthestOffAxis) return std::nullopt;
+    const double slope = std::tan(r);
+    tangential *= slope / r;
+    radial *= 1 + slope * slope;
+  }
   if (magnification != nullptr) *magnification = std::sqrt(tangential * radial) / lens.focal;
   return bent * tangential;
 }

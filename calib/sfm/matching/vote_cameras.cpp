@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "calib/models/fisheye.h"
 #include "calib/sfm/matching/lens_vote.h"
 #include "calib/sfm/matching/pair_kind.h"
 #include "calib/sfm/matching/robust_fit.h"
@@ -31,7 +32,10 @@ std::optional<int> RadialIndex(calib::CameraModel model) {
       return -1;
     case calib::CameraModel::kSimpleRadial:
     case calib::CameraModel::kRadial:
+    case calib::CameraModel::kSimpleRadialFisheye:
+    case calib::CameraModel::kRadialFisheye:
       return 3;
+    case calib::CameraModel::kOpenCvFisheye:
     case calib::CameraModel::kOpenCv:
     case calib::CameraModel::kFullOpenCv:
       return 4;
@@ -59,6 +63,44 @@ struct Candidate {
   bool planar = false;  // one homography explains it: any focal length does
 };
 
+// The matches of a pair, and those of them that a fundamental matrix explains.
+struct Explained {
+  PointPairs points;         // as VotePair has them
+  PointPairs on_plane;       // where `fundamental` is of them
+  std::vector<int> inliers;  // indices into both
+  Eigen::Matrix3d fundamental = Eigen::Matrix3d::Zero();
+  double band = 0;  // on the plane
+};
+
+Explained ExplainedBy(PointPairs points, PointPairs on_plane, double band, std::uint64_t seed) {
+  Explained explained{std::move(points), std::move(on_plane), {}, {}, band};
+  if (const auto fit = FitFundamental(explained.on_plane, band, seed)) {
+    explained.inliers = fit->inliers;
+    explained.fundamental = fit->m;
+  }
+  return explained;
+}
+
+// No fundamental matrix is of a fisheye's photos. It is of what they become with the right focal
+// length, and nearly so with one near it.
+Explained ExplainedOfFisheye(const PointPairs& points, double band, std::uint64_t seed) {
+  constexpr double kFocals[] = {0.25, 0.33, 0.45, 0.65};  // long sides
+  Explained best;
+  for (const double focal : kFocals) {
+    PointPairs kept, on_plane;
+    for (size_t i = 0; i < points.size(); ++i) {
+      const auto p = Unbent({focal, 0, true}, points.a[i], nullptr);
+      const auto q = Unbent({focal, 0, true}, points.b[i], nullptr);
+      if (!p || !q) continue;
+      kept.Add(points.a[i], points.b[i]);
+      on_plane.Add(*p, *q);
+    }
+    Explained explained = ExplainedBy(std::move(kept), std::move(on_plane), band / focal, seed);
+    if (explained.inliers.size() > best.inliers.size()) best = std::move(explained);
+  }
+  return best;
+}
+
 Candidate CandidateOf(const CoarsePair& coarse, std::span<const MatchPhoto> photos,
                       const calib::LensCamera& camera, std::uint64_t seed) {
   PointPairs points;
@@ -71,19 +113,23 @@ Candidate CandidateOf(const CoarsePair& coarse, std::span<const MatchPhoto> phot
   }
   Candidate candidate;
   const double band = BandOf(LongSide(camera));
-  const auto fit = FitFundamental(points, band, seed);
-  if (!fit || fit->inliers.size() < kFewestInliers) return candidate;
-  PointPairs inliers;
-  for (const int i : fit->inliers) {
-    inliers.Add(points.a[static_cast<size_t>(i)], points.b[static_cast<size_t>(i)]);
+  const Explained explained = calib::IsFisheye(camera.model)
+                                  ? ExplainedOfFisheye(points, band, seed)
+                                  : ExplainedBy(points, points, band, seed);
+  if (explained.inliers.size() < kFewestInliers) return candidate;
+  PointPairs inliers, on_plane;
+  for (const int i : explained.inliers) {
+    const auto at = static_cast<size_t>(i);
+    inliers.Add(explained.points.a[at], explained.points.b[at]);
+    on_plane.Add(explained.on_plane.a[at], explained.on_plane.b[at]);
   }
-  const double parallax = MedianHomographyDistance(inliers) / (2 * band);
+  const double parallax = MedianHomographyDistance(on_plane) / (2 * explained.band);
   candidate.weight =
       static_cast<double>(std::min<size_t>(inliers.size(), 200)) * std::clamp(parallax, 0.0, 1.0);
-  const auto homography = FitHomography(inliers, band, HashOf(seed, 1));
+  const auto homography = FitHomography(on_plane, explained.band, HashOf(seed, 1));
   candidate.planar = homography && static_cast<double>(homography->inliers.size()) >=
                                        kPlanarShare * static_cast<double>(inliers.size());
-  candidate.pair.fundamental = fit->m;
+  candidate.pair.fundamental = explained.fundamental;
   candidate.pair.photo_a = coarse.a;
   candidate.pair.photo_b = coarse.b;
   const size_t count = std::min(inliers.size(), kVotingMatches);
@@ -211,6 +257,7 @@ void VoteOnCameras(std::span<const MatchPhoto> photos, std::span<const CoarsePai
     VoteOptions vote;
     vote.prior_focal = prior.params[0] / LongSide(prior);
     vote.k1_is_fixed = *radial < 0;
+    vote.fisheye = calib::IsFisheye(prior.model);
     vote.threads = options.threads;
     vote.progress = options.progress;
     const auto voters = VotersOf(std::move(own), photos, prior, options);

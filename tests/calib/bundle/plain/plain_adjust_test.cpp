@@ -8,6 +8,7 @@
 #include "calib/bundle/plain/minimise.h"
 #include "calib/bundle/plain/normal.h"
 #include "calib/colmap/model_io.h"
+#include "calib/models/fisheye.h"
 #include "calib/models/lens_formula.h"
 #include "dtr/base/error.h"
 #include "tests/calib/bundle/synthetic_bundle.h"
@@ -28,6 +29,9 @@ const LensCamera kPlainLenses[] = {
     {CameraModel::kSimpleRadial, 1000, 800, {900, 504, 397, -0.05}},
     {CameraModel::kRadial, 1000, 800, {900, 504, 397, -0.05, 0.01}},
     {CameraModel::kOpenCv, 1000, 800, {900, 905, 504, 397, -0.05, 0.01, 1e-3, -2e-3}},
+    {CameraModel::kSimpleRadialFisheye, 1000, 800, {600, 504, 397, -0.05}},
+    {CameraModel::kRadialFisheye, 1000, 800, {600, 504, 397, -0.05, 0.01}},
+    {CameraModel::kOpenCvFisheye, 1000, 800, {600, 605, 504, 397, -0.05, 0.01, 2e-3, -1e-3}},
 };
 
 // Both solvers stop where a step promises 1e-11 of the cost: what is left of it is far below this.
@@ -53,7 +57,8 @@ TEST(PlainProjection, AgreesWithJetsOfTheFormula) {
     const auto count = lens.params.size();
     Jet params[8], p[3], expected[2];
     for (size_t i = 0; i < count; ++i) params[i] = Jet(lens.params[i], static_cast<int>(i));
-    const double at[3] = {0.3, -0.2, 1.3};
+    const double z = calib::IsFisheye(lens.model) ? -0.05 : 1.3;  // it sees behind its plane, too
+    const double at[3] = {0.3, -0.2, z};
     for (int i = 0; i < 3; ++i) p[i] = Jet(at[i], 8 + i);
     ASSERT_TRUE(FormulaOf(lens.model, params).Project(p, expected));
     const plain::Intrinsics of = plain::IntrinsicsOf(lens.model, lens.params.data());
@@ -69,8 +74,23 @@ TEST(PlainProjection, AgreesWithJetsOfTheFormula) {
       }
     }
     const double behind[3] = {0.1, 0.1, -1};
-    EXPECT_FALSE(plain::Project(of, behind, pixel));
+    EXPECT_EQ(plain::Project(of, behind, pixel), calib::IsFisheye(lens.model));
   }
+}
+
+// On the axis of a fisheye the formula is 0 / 0.
+TEST(PlainProjection, AFisheyesAxisHasTheDerivativesOfItsSurroundings) {
+  const LensCamera& lens = *std::find_if(std::begin(kPlainLenses), std::end(kPlainLenses),
+                                         [](const auto& l) { return IsFisheye(l.model); });
+  const plain::Intrinsics of = plain::IntrinsicsOf(lens.model, lens.params.data());
+  double pixel[2], on_axis[6], near[6], by_lens[2 * plain::kColumns];
+  const double axis[3] = {0, 0, 2}, beside[3] = {1e-7, -1e-7, 2}, away[3] = {0, 0, -2};
+  plain::Differentiate(of, axis, pixel, on_axis, by_lens);
+  EXPECT_NEAR(pixel[0], 504, 1e-12);
+  EXPECT_NEAR(on_axis[0], 300, 1e-9);
+  plain::Differentiate(of, beside, pixel, near, by_lens);
+  for (int i = 0; i < 6; ++i) EXPECT_NEAR(on_axis[i], near[i], 1e-4);
+  EXPECT_FALSE(plain::Project(of, away, pixel));
 }
 
 // The gradient of cameras, lenses and priors against differences of the cost, under Cauchy's loss.
@@ -378,7 +398,8 @@ TEST(PlainAdjust, RejectsWhatItCannotSolve) {
   Bundle bundle = MakeBundle({});
   EXPECT_THROW(AdjustPlain({}, std::vector<bool>(3, true), bundle), Error);
   EXPECT_THROW(AdjustPlain({}, std::vector<bool>(bundle.observations.size()), bundle), Error);
-  bundle.lenses[0] = {CameraModel::kRadialFisheye, 1000, 800, {900, 504, 397, 0, 0}};
+  bundle.lenses[0] = {
+      CameraModel::kFullOpenCv, 1000, 800, {900, 900, 504, 397, 0, 0, 0, 0, 0, 0, 0, 0}};
   EXPECT_THROW(AdjustPlain({}, {}, bundle), Error);
 }
 

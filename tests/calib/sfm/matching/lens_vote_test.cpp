@@ -14,14 +14,14 @@ constexpr double kFocal = 0.9;         // long sides
 constexpr double kNoise = 0.3 / 1600;  // of features
 
 // All pairs of seven photos about a box; of `zoomed`, the photos from the last but two on, the
-// focal length is another one.
-std::vector<VotePair> Pairs(double zoomed) {
+// focal length is another one. Of a fisheye points lie nearer, so that they are farther off axis.
+std::vector<VotePair> Pairs(double zoomed, bool fisheye = false) {
   constexpr int kPhotos = 7;
   Random random(3);
   std::vector<Eigen::Vector3d> points;
   for (int i = 0; i < 80; ++i) {
     const double x = random.Uniform(-3, 3), y = random.Uniform(-2, 2);
-    points.emplace_back(x, y, random.Uniform(5, 10));
+    points.emplace_back(x, y, random.Uniform(fisheye ? 1.5 : 5, 10));
   }
   std::vector<Eigen::Matrix3d> rotations;
   std::vector<Eigen::Vector3d> translations;
@@ -41,7 +41,8 @@ std::vector<VotePair> Pairs(double zoomed) {
       pair.photo_a = a;
       pair.photo_b = b;
       const auto seen = [&](int photo, const Eigen::Vector3d& p) {
-        const Eigen::Vector2d at = (rotations[photo] * p + translations[photo]).hnormalized();
+        Eigen::Vector2d at = (rotations[photo] * p + translations[photo]).hnormalized();
+        if (fisheye) at *= std::atan(at.norm()) / at.norm();
         const double dx = random.Normal();
         return Eigen::Vector2d(focal(photo) * at + kNoise * Eigen::Vector2d(dx, random.Normal()));
       };
@@ -52,9 +53,11 @@ std::vector<VotePair> Pairs(double zoomed) {
       RelativePose pose;
       pose.r = rotations[b] * rotations[a].transpose();
       pose.t = (translations[b] - pose.r * translations[a]).normalized();
-      const Eigen::Vector3d k_a(1 / focal(a), 1 / focal(a), 1), k_b(1 / focal(b), 1 / focal(b), 1);
-      pair.fundamental = k_b.asDiagonal() * pose.Essential() * k_a.asDiagonal();
+      pair.fundamental = pose.Essential();
       pairs.push_back(pair);
+      if (fisheye) continue;
+      const Eigen::Vector3d k_a(1 / focal(a), 1 / focal(a), 1), k_b(1 / focal(b), 1 / focal(b), 1);
+      pairs.back().fundamental = k_b.asDiagonal() * pose.Essential() * k_a.asDiagonal();
     }
   }
   return pairs;
@@ -65,6 +68,37 @@ TEST(LensVote, FindsTheFocalLengthWithinItsDeviation) {
   ASSERT_TRUE(vote);
   EXPECT_LT(std::abs(std::log(vote->lens.focal / kFocal)), 4 * vote->log_focal_deviation);
   EXPECT_LT(vote->log_focal_deviation, 0.01);
+}
+
+TEST(LensVote, FindsTheFocalLengthOfAFisheyeWithinItsDeviation) {
+  VoteOptions options;
+  options.fisheye = true;
+  options.prior_focal = 0.4;
+  const auto vote = VoteOnLens(Pairs(kFocal, true), options);
+  ASSERT_TRUE(vote);
+  EXPECT_TRUE(vote->lens.fisheye);
+  EXPECT_LT(std::abs(std::log(vote->lens.focal / kFocal)), 4 * vote->log_focal_deviation);
+  EXPECT_LT(vote->log_focal_deviation, 0.01);
+  EXPECT_NEAR(vote->lens.k1, 0, 0.01);
+}
+
+TEST(LensVote, AFisheyesPixelIsItsAngleAndItsMagnificationThatOfThePlane) {
+  constexpr double kStep = 1e-6;
+  const VoteLens lens{0.4, -0.05, true};
+  const Eigen::Vector2d direction(0.6, -0.8);
+  const auto at = [&](double angle) {
+    return Eigen::Vector2d(lens.focal * angle * (1 + lens.k1 * angle * angle) * direction);
+  };
+  double magnification = 0;
+  const auto point = Unbent(lens, at(1.1), &magnification);
+  ASSERT_TRUE(point);
+  EXPECT_NEAR((*point - std::tan(1.1) * direction).norm(), 0, 1e-9);
+  // Radial and tangential lengths on the plane over those on the photo.
+  const double radial = (*Unbent(lens, at(1.1 + kStep), nullptr) - *point).norm() /
+                        (at(1.1 + kStep) - at(1.1)).norm();
+  const double tangential = std::tan(1.1) / at(1.1).norm();
+  EXPECT_NEAR(magnification, std::sqrt(radial * tangential), 1e-4);
+  EXPECT_FALSE(Unbent({0.4, 0, true}, 0.4 * 1.5 * direction, nullptr));
 }
 
 // Matches of one zoomed photo agree with each other as well as any: only that photos differ tells.
