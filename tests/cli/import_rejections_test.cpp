@@ -53,6 +53,32 @@ TEST_F(Rejections, WhatCannotBeImported) {
   EXPECT_FALSE(fs::exists(In("set.dtr.partial")));
 }
 
+TEST_F(Rejections, FocalLengthsThatCannotBe) {
+  Json cameras = Cameras();
+  cameras["views"][1]["fy"] = 3;
+  const Json frame = {
+      {"file_path", "0000.jpg"},
+      {"transform_matrix", {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}}};
+  const Json transforms = {{"fl_x", 3}, {"w", 192}, {"h", 128}, {"frames", {frame}}};
+  Folder("model");
+  Write("model/cameras.txt", "7 PINHOLE 192 128 3 3 96 64\n");
+  Write("model/images.txt", "1 1 0 0 0 0 0 0 7 0000.jpg\n\n");
+  Write("model/points3D.txt", "");
+  for (const auto& [file, entry] : {
+           std::pair{Write("short.json", cameras.dump()), "short.json: views[1] (0001.jpg)"},
+           {Write("transforms.json", transforms.dump()), "transforms.json: frames[0] (0000.jpg)"},
+           {In("model"), "model: camera 7"},
+       }) {
+    const Ran ran = Dtr({"import", "--cameras", file, "--images", Photos(), "-o", In("set.dtr")});
+    ExpectRejected(ran, kFailed, "the file has another unit, or belongs to other images");
+    EXPECT_NE(ran.err.find(std::string(entry) +
+                           ": a focal length of 3 px cannot be that of an image of 192 x 128 px"),
+              std::string::npos)
+        << ran.err;
+  }
+  EXPECT_FALSE(fs::exists(In("set.dtr")));
+}
+
 // Of cameras whose file names no masks they are found by the photos' names, beside the photos, too.
 TEST_F(Rejections, MasksThatNoFileNamesAreFound) {
   Mask mask(kCourtyardWidthPx, kCourtyardHeightPx, 1, 255);

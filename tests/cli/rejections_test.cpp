@@ -129,6 +129,7 @@ TEST_F(Rejections, PicturesOfNoSizeOrOfSeveralCameras) {
   Json huge = Cameras();
   huge["views"].erase(huge["views"].begin() + 1, huge["views"].end());
   huge["views"][0]["width"] = huge["views"][0]["height"] = 20000;
+  huge["views"][0]["fx"] = huge["views"][0]["fy"] = 20000;
   const std::string picture = In("view.png"), folder = Folder("folder.png");
   ExpectAllRejected({
       {kWrongUsage, "--size 10: expected WxH, such as 1280x720",
@@ -287,7 +288,8 @@ TEST_F(Rejections, AProgramCalledColmapThatIsNotIt) {
   ExpectRejected(build(), kFailed,
                  "expected a program that calls itself COLMAP, found one that does not");
   Program("colmap", "echo COLMAP 9.9");
-  ExpectRejected(build(), kFailed, "without it; install another version (tested with 3.8 and 3.10)");
+  ExpectRejected(build(), kFailed,
+                 "without it; install another version (tested with 3.8 and 3.10)");
   ExpectRejected(Dtr({"build", Photos(), "-o", In("other.dtr"), "--memory", "0.001"}), kWrongUsage,
                  "--memory 0.001: expected at least");
   EXPECT_FALSE(fs::exists(In("set.dtr")));

@@ -9,6 +9,7 @@
 #include "dtr/base/file_names.h"
 #include "dtr/base/files.h"
 #include "dtr/io/formats/json_fields.h"
+#include "dtr/io/formats/plausible_intrinsics.h"
 #include "dtr/io/formats/pose_from_matrix.h"
 
 namespace dtr::io {
@@ -76,6 +77,7 @@ NamedCamera CameraFrom(const Json& view, const std::string& where) {
   named.camera = PinholeCamera(
       width_px, height_px, FocalField(view, "fx", here), FocalField(view, "fy", here),
       internal::NumberField(view, "cx", here), internal::NumberField(view, "cy", here));
+  RequirePlausibleFocal(named.camera.fx_px(), named.camera.fy_px(), width_px, height_px, here);
   named.cam_from_world = PoseFromMatrix(internal::MatrixField(view, "cam_from_world", false, here),
                                         kRotationTolerance, here + ".cam_from_world");
   return named;

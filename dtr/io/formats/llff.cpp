@@ -6,6 +6,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/file_names.h"
 #include "dtr/io/formats/npy.h"
+#include "dtr/io/formats/plausible_intrinsics.h"
 #include "dtr/io/formats/pose_from_matrix.h"
 
 namespace dtr::io {
@@ -25,6 +26,7 @@ PinholeCamera CameraFrom(double height_px, double width_px, double focal_px,
   if (!(focal_px > 0)) {
     throw Error(where + ": expected a positive focal length, found " + std::to_string(focal_px));
   }
+  RequirePlausibleFocal(focal_px, focal_px, int(width_px), int(height_px), where);
   const PinholeCamera full_size(int(width_px), int(height_px), focal_px, focal_px, width_px / 2,
                                 height_px / 2);
   return ScaledToImage(full_size, image, where);

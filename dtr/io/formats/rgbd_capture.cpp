@@ -9,6 +9,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/file_names.h"
 #include "dtr/base/files.h"
+#include "dtr/io/formats/plausible_intrinsics.h"
 #include "dtr/io/formats/pose_from_matrix.h"
 #include "dtr/io/formats/rgbd_parts.h"
 #include "dtr/io/image_io.h"
@@ -108,6 +109,8 @@ void AddFrame(const SizedImage& photo, const PinholeCamera& camera, const Pose& 
               const std::string& depth_file, RgbdCapture& capture) {
   NamedCamera named;
   named.name = photo.name;
+  RequirePlausibleFocal(camera.fx_px(), camera.fy_px(), camera.width_px(), camera.height_px(),
+                        (capture.images / photo.name).string());
   named.depth_file = depth_file;
   named.camera = camera;
   named.cam_from_world = cam_from_world;

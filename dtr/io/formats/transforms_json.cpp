@@ -11,6 +11,7 @@
 #include "dtr/base/file_names.h"
 #include "dtr/base/files.h"
 #include "dtr/io/formats/json_fields.h"
+#include "dtr/io/formats/plausible_intrinsics.h"
 #include "dtr/io/formats/pose_from_matrix.h"
 #include "dtr/io/formats/transforms_lens.h"
 
@@ -64,6 +65,7 @@ PinholeCamera CameraFrom(const FrameFields& fields, const SizedImage& image) {
   } else if (!fields.Has("fl_x") && fields.Has("camera_angle_y")) {
     fy_px = FocalFromAngle(fields, "camera_angle_y", height_px);
   }
+  RequirePlausibleFocal(fx_px, fy_px, width_px, height_px, fields.where());
   const double cx_px = fields.Has("cx") ? fields.Number("cx") : width_px / 2.0;
   const double cy_px = fields.Has("cy") ? fields.Number("cy") : height_px / 2.0;
   const PinholeCamera camera(width_px, height_px, fx_px, fy_px, cx_px, cy_px);

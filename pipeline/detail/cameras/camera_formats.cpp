@@ -8,6 +8,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/lower_case.h"
 #include "dtr/io/formats/foreign_readers.h"
+#include "dtr/io/formats/plausible_intrinsics.h"
 #include "dtr/io/formats/rgbd_capture.h"
 #include "pipeline/detail/photos/named_files.h"
 #include "pipeline/import.h"
@@ -215,6 +216,18 @@ const CameraFormat& FormatOf(const fs::path& file, const std::string& name,
 bool IsColmapModel(const fs::path& file, const std::string& name) {
   if (!name.empty()) return name == "colmap";
   return fs::is_directory(file) && LooksColmap(file, {.is_folder = true, .head = "", .keys = {}});
+}
+
+calib::SfmModel ReadGivenModel(const fs::path& folder) {
+  const fs::path model_folder = colmap::ModelFolderIn(folder);
+  calib::SfmModel model = colmap::ReadModel(model_folder);
+  for (const auto& [id, camera] : model.cameras) {
+    if (!calib::HasImages(model, id)) continue;
+    const PinholeCamera pinhole = camera.Pinhole();
+    io::RequirePlausibleFocal(pinhole.fx_px(), pinhole.fy_px(), camera.width_px, camera.height_px,
+                              fmt::format("{}: camera {}", model_folder.string(), id));
+  }
+  return model;
 }
 
 std::vector<fs::path> WithCompanions(const fs::path& file) {

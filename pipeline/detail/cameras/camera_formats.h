@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/sfm_model.h"
 #include "dtr/io/formats/file_look.h"
 #include "dtr/io/formats/foreign_scene.h"
 
@@ -31,6 +32,10 @@ const CameraFormat& FormatOf(const std::filesystem::path& file, const std::strin
 
 /// Whether that is a COLMAP model; false too where the format cannot be told.
 bool IsColmapModel(const std::filesystem::path& file, const std::string& name);
+
+/// The model that a COLMAP folder holds. Throws Error as colmap::ReadModel, and for cameras of
+/// images whose focal length no camera has.
+calib::SfmModel ReadGivenModel(const std::filesystem::path& folder);
 
 /// The file and those beside it that readers take in: lists of images, tracks.
 std::vector<std::filesystem::path> WithCompanions(const std::filesystem::path& file);

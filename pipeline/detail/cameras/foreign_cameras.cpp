@@ -8,6 +8,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/file_names.h"
+#include "dtr/io/formats/plausible_intrinsics.h"
 #include "pipeline/detail/import/camera_distortion.h"
 
 namespace dtr::pipeline {
@@ -28,28 +29,6 @@ io::Distortion InPixels(const io::ForeignIntrinsics& intrinsics, int width_px, i
     lens.params[3] += height_px / 2.0;
   }
   return lens;
-}
-
-// Lengths that no camera has are those of other units or of another image.
-void RequirePlausible(const io::Distortion& lens, int width_px, int height_px,
-                      const std::string& where) {
-  constexpr double kMinFocal = 0.02, kMaxFocal = 1000;  // long sides: 175 degrees, 3 arc minutes
-  const double side = std::max(width_px, height_px);
-  for (const double focal : {lens.params[0], lens.params[1]}) {
-    if (focal >= kMinFocal * side && focal <= kMaxFocal * side) continue;
-    throw Error(fmt::format(
-        "{}: a focal length of {:g} px cannot be that of an image of {} x {} px; the file has "
-        "another unit, or belongs to other images",
-        where, focal, width_px, height_px));
-  }
-  if (std::abs(lens.params[2] - width_px / 2.0) <= width_px &&
-      std::abs(lens.params[3] - height_px / 2.0) <= height_px) {
-    return;
-  }
-  throw Error(fmt::format(
-      "{}: a principal point of ({:g}, {:g}) px cannot be that of an image of {} x {} px; the file "
-      "has another unit, or belongs to other images",
-      where, lens.params[2], lens.params[3], width_px, height_px));
 }
 
 // Absolute pixels without the size of the image: images of another size show by the principal
@@ -88,7 +67,8 @@ OnPhoto CameraOn(const io::ForeignCamera& camera, const io::SizedImage& image,
     height_px = image.height_px;
   }
   io::Distortion lens = InPixels(intrinsics, width_px, height_px);
-  RequirePlausible(lens, width_px, height_px, where);
+  io::RequirePlausibleFocal(lens.params[0], lens.params[1], width_px, height_px, where);
+  io::RequirePlausibleCentre(lens.params[2], lens.params[3], width_px, height_px, where);
   OnPhoto on;
   on.named.name = image.name;
   on.named.cam_from_world = camera.cam_from_world;

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "calib/colmap/model_io.h"
+#include "pipeline/detail/cameras/camera_formats.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -48,7 +48,7 @@ void NameAsPhotos(const capture::Capture& capture, io::CameraList& list) {
 }
 
 calib::SfmModel ReadModelOf(const capture::Capture& capture, const std::filesystem::path& folder) {
-  calib::SfmModel model = colmap::ReadModel(colmap::ModelFolderIn(folder));
+  calib::SfmModel model = ReadGivenModel(folder);
   std::vector<std::string*> names;
   for (calib::SfmImage& image : model.images) names.push_back(&image.name);
   Rename(capture, names);
