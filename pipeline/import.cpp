@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 
+#include "calib/sparse_from_sfm.h"
 #include "capture/ingest.h"
 #include "dtr/base/error.h"
 #include "dtr/base/temporary_folder.h"
 #include "dtr/io/formats/rgbd_capture.h"
 #include "dtr/io/set_io.h"
+#include "pipeline/detail/cameras/given_cameras.h"
 #include "pipeline/detail/cameras/known_poses.h"
 #include "pipeline/detail/import/camera_distortion.h"
 #include "pipeline/detail/import/camera_files.h"
@@ -94,16 +97,25 @@ std::optional<double> DepthUnit(const ImportRequest& request, const CamerasFromF
   return request.depth_unit ? request.depth_unit : cameras.depth_unit;
 }
 
-// Points of a set without depth, where the cameras come without: COLMAP finds them.
-void FindPoints(const ImportRequest& request, ImportOptions& options, CamerasFromFile& cameras,
-                Progress& progress) {
-  if (!request.depth.empty() || (cameras.points && !cameras.points->points.empty())) return;
-  if (!cameras.points_file.empty()) {
-    progress.Note(
-        fmt::format("{}: points of {} are not used, they do not say which photo sees them",
-                    request.cameras.string(), cameras.points_file));
-  }
+// Poses act on p_world - origin afterwards, the points of the model with them.
+void Recentre(CamerasFromFile& cameras) {
+  const Eigen::Vector3d before = cameras.list.world_origin;
   cameras.list = io::RecentreWorld(std::move(cameras.list));
+  if (!cameras.model) return;
+  std::map<std::string, const Pose*> pose_of;
+  for (const io::NamedCamera& named : cameras.list.cameras) {
+    pose_of[named.name] = &named.cam_from_world;
+  }
+  for (calib::SfmImage& image : cameras.model->images) {
+    image.cam_from_world = *pose_of.at(image.name);
+  }
+  const Eigen::Vector3d moved = cameras.list.world_origin - before;
+  for (auto& [id, point] : cameras.model->points) point.p_in_world -= moved;
+}
+
+// The model with points: the file's, tested, or of the photos; adjusted where that is asked for.
+CalibratedPhotos Calibrated(const ImportRequest& request, const ImportOptions& options,
+                            CamerasFromFile& cameras, Progress& progress) {
   const capture::Capture photos = PhotosOf(cameras.list, options);
   CalibrateOptions calibrate;
   for (const capture::Photo& photo : photos.photos) {
@@ -113,9 +125,64 @@ void FindPoints(const ImportRequest& request, ImportOptions& options, CamerasFro
   calibrate.seed = request.seed;
   calibrate.memory_gb = request.memory_gb;
   calibrate.poses = request.cameras;
+  calibrate.refine_poses = request.refine;
   const TemporaryFolder workspace;
-  cameras.points = TriangulatedPoints(cameras.list, photos, calibrate, workspace.path(),
-                                      options.conventions.emplace(), progress);
+  if (cameras.model) {
+    return WithPointsOfFile(std::move(*cameras.model), photos, calibrate, workspace.path(),
+                            progress);
+  }
+  if (!cameras.points_file.empty()) {
+    progress.Note(
+        fmt::format("{}: points of {} are not used, they do not say which photo sees them",
+                    request.cameras.string(), cameras.points_file));
+  }
+  return WithPointsOfPhotos(cameras.list, photos, calibrate, workspace.path(), progress);
+}
+
+// Adjusted cameras take the place of the given ones.
+void TakeCameras(const calib::SfmModel& model, io::CameraList& list) {
+  std::map<std::string, const calib::SfmImage*> image_of;
+  for (const calib::SfmImage& image : model.images) image_of[image.name] = &image;
+  for (io::NamedCamera& named : list.cameras) {
+    const calib::SfmImage& image = *image_of.at(named.name);
+    SetCameraModel(named, model.cameras.at(image.camera_id));
+    named.cam_from_world = image.cam_from_world;
+  }
+}
+
+// Points of the views; says how many of the file's are of photos that are not here.
+SparseScene PointsOf(const ImportRequest& request, const CamerasFromFile& cameras, bool from_file,
+                     Progress& progress) {
+  std::vector<std::string> names;
+  std::vector<PinholeCamera> pinholes;
+  for (const io::NamedCamera& named : cameras.list.cameras) {
+    names.push_back(named.name);
+    pinholes.push_back(named.camera);
+  }
+  SparseScene points = calib::ToSparseScene(*cameras.model, names, pinholes);
+  const size_t all = cameras.model->points.size(), used = points.points.size();
+  if (from_file && used < all) {
+    progress.Note(
+        fmt::format("{}: {} of its {} points are not used, fewer than two of the photos see them",
+                    request.cameras.string(), all - used, all));
+  }
+  return points;
+}
+
+// Points of the file, or of the photos: those of a set without depth. Adjusts the cameras to them
+// where that is asked for.
+std::optional<SparseScene> FindPoints(const ImportRequest& request, ImportOptions& options,
+                                      CamerasFromFile& cameras, Progress& progress) {
+  const bool from_file = cameras.model.has_value();
+  if (!from_file && !request.depth.empty()) return std::nullopt;
+  Recentre(cameras);
+  CalibratedPhotos calibrated = Calibrated(request, options, cameras, progress);
+  options.calibration = std::move(calibrated.report);
+  cameras.model = std::move(calibrated.model);
+  const auto& adjustment = options.calibration.bundle_adjustment;
+  const bool adjusted = adjustment && adjustment->refined.changed;
+  if (adjusted) TakeCameras(*cameras.model, cameras.list);
+  return PointsOf(request, cameras, from_file && !adjusted, progress);
 }
 
 ImportOptions OptionsFor(const ImportRequest& request, CamerasFromFile& cameras,
@@ -166,14 +233,21 @@ ImportReport Import(ImportRequest request, Progress& listener) {
                                             .allow_missing = request.allow_missing});
   for (const std::string& note : cameras.notes) progress.Note(note);
   TakeFolders(cameras, request);
+  if (request.refine && !request.depth.empty()) {
+    throw UsageError(
+        "`refine`: depth maps belong to the cameras as they are given; leave out `depth`, or let "
+        "dtr build adjust the cameras (`poses`, `refine`) and take the depth as a prior "
+        "(`depth_prior`)");
+  }
   ImportOptions options = OptionsFor(request, cameras, progress);
   io::SetWriter::RequireTarget(request.output, request.force);
   ImportReport report;
   report.contents = ContentsFor(options, cameras.list);
   listener.Note(capture::LineOf(report.contents));
-  FindPoints(request, options, cameras, progress);
+  const std::optional<SparseScene> points = FindPoints(request, options, cameras, progress);
   report.alpha = ImportSet(cameras.list, options, request.output, request.force,
-                           cameras.points ? &*cameras.points : nullptr, progress);
+                           points ? &*points : nullptr, progress);
+  report.calibration = std::move(options.calibration);
   report.views = cameras.list.cameras.size();
   report.held_out = options.held_out.size();
   report.skipped = std::move(cameras.skipped);

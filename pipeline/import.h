@@ -11,6 +11,7 @@
 #include "dtr/base/progress.h"
 #include "dtr/io/image_io.h"
 #include "dtr/types/view.h"
+#include "pipeline/calibration_report.h"
 
 namespace dtr::pipeline {
 
@@ -26,6 +27,7 @@ struct ImportRequest {
   bool allow_missing = false;           ///< leave out cameras whose photo is not there
   std::filesystem::path output;         ///< NAME.dtr
   bool force = false;                   ///< replace a set that exists
+  bool refine = false;                  ///< adjust the cameras, where held-out observations gain
   bool completion = true;               ///< of depth that is imported (CompleteDepth)
   double memory_gb = 4;                 ///< for views in memory at a time (one may be larger)
   int threads = 0;
@@ -37,16 +39,20 @@ struct ImportReport {
   io::AlphaTotals alpha;
   std::vector<std::pair<std::string, std::string>> skipped;  ///< camera, reason
   std::vector<std::string> notes;                            ///< what was logged, a line each
-  capture::FolderContents contents;                          ///< of the folder of images
+  /// What tests and adjustment of the cameras gave: given_cameras, bundle_adjustment, points.
+  CalibrationReport calibration;
+  capture::FolderContents contents;  ///< of the folder of images
 };
 
 /// The formats of ImportRequest::cameras and BuildOptions::poses, in byte order.
 std::vector<std::string> CameraFormats();
 
 /// Writes a whole set. Distorted photos are undistorted; a set without depth maps gets the points
-/// of the cameras' file, or those that COLMAP triangulates. Throws UsageError when the output
-/// exists (without force), Error for a file that is absent, damaged or of another size. A failure
-/// or an interruption leaves nothing behind.
+/// of the cameras' file, or those that are triangulated from the photos. With `refine` the cameras
+/// are adjusted to these points where held-out observations gain; world and unit stay. Throws
+/// UsageError when the output exists (without force) and for `refine` with depth maps, Error for a
+/// file that is absent, damaged or of another size. A failure or an interruption leaves nothing
+/// behind.
 ImportReport Import(ImportRequest request, Progress& progress);
 
 }  // namespace dtr::pipeline

@@ -10,6 +10,7 @@
 
 #include "calib/bundle/covariance.h"
 #include "calib/bundle/held_out.h"
+#include "calib/bundle/refine_independent.h"
 #include "dtr/base/error.h"
 #include "dtr/base/order_statistics.h"
 #include "dtr/base/parallel_for.h"
@@ -153,11 +154,22 @@ std::vector<std::vector<double>> TryOnUnseenPoints(const Bundle& bundle,
   return losses;
 }
 
+/// Whether cameras that were adjusted to half of the points predict the other half better than the
+/// cameras as given, which have seen none.
+bool BeatsGiven(const std::vector<std::vector<double>>& losses, size_t chosen,
+                const RefineOptions& options, Refined& refined) {
+  refined.given_px = refined.candidates[0].held_out_px;
+  refined.adjusted_px = refined.candidates[chosen].held_out_px;
+  refined.held_out_observations = static_cast<int>(losses[chosen].size());
+  if (refined.given_px <= kPrecisionPx) return false;  // exact: what is left is rounding
+  return BootstrapOfDifference(losses[chosen], losses[0], options.seed).second < 0;
+}
+
 /// Which lens parameters to free, by points that were not adjusted to; index of the candidate, or
 /// kNoneConverged, or kNoScale where nothing says how far observations err. A candidate whose solve
 /// did not converge is not taken.
 size_t Choose(const Bundle& bundle, const ObservationSplit& split, const RefineOptions& options,
-              Refined& refined) {
+              bool given_are_independent, Refined& refined) {
   auto& candidates = refined.candidates;
   candidates = CandidatesFor(bundle, options.separate_lenses);
   double sigma_px = 0;
@@ -183,8 +195,11 @@ size_t Choose(const Bundle& bundle, const ObservationSplit& split, const RefineO
     if (candidate.converged && better) chosen = i;
   }
   if (!candidates[0].converged || chosen == 0) return kNoneConverged;
-  // Now like with like: adjusted to all observations, as the given model was.
+  const bool by_points = given_are_independent && !HasPriors(options);
+  if (by_points && !BeatsGiven(losses, chosen, options, refined)) return 0;
   refined.adjusted = Adjust(bundle, SolveOptions(options, candidates[chosen].lens));
+  if (by_points) return refined.adjusted.converged ? chosen : kNoneConverged;
+  // Now like with like: adjusted to all observations, as the given model was.
   const auto given = LossesOfHeldOutObservations(bundle, split, scale_px);
   const auto adjusted = LossesOfHeldOutObservations(refined.adjusted.bundle, split, scale_px);
   refined.given_px = std::sqrt(Mean(given));
@@ -250,7 +265,10 @@ SfmModel WithLenses(SfmModel model, const std::map<std::uint32_t, LensCamera>& l
   return model;
 }
 
-Refined Refine(const SfmModel& model, const RefineOptions& options) {
+namespace {
+
+Refined RefineModel(const SfmModel& model, const RefineOptions& options,
+                    bool given_are_independent) {
   Refined refined;
   refined.model = model;
   if (options.known_lenses) {
@@ -280,7 +298,7 @@ Refined Refine(const SfmModel& model, const RefineOptions& options) {
                                  kMinHeldOut, kMinTrack, enough);
     return refined;
   }
-  const size_t chosen = Choose(bundle, split, options, refined);
+  const size_t chosen = Choose(bundle, split, options, given_are_independent, refined);
   if (chosen == kNoneConverged || chosen == kNoScale || chosen == 0) {
     refined.reason = chosen == 0          ? "held-out observations are predicted no better"
                      : chosen == kNoScale ? "the observations are no more than the unknowns"
@@ -291,6 +309,16 @@ Refined Refine(const SfmModel& model, const RefineOptions& options) {
   refined.lens = refined.candidates[chosen].lens;
   Finish(model, options, refined);
   return refined;
+}
+
+}  // namespace
+
+Refined Refine(const SfmModel& model, const RefineOptions& options) {
+  return RefineModel(model, options, false);
+}
+
+Refined RefineIndependent(const SfmModel& model, const RefineOptions& options) {
+  return RefineModel(model, options, true);
 }
 
 std::vector<Degeneracy> DegeneraciesOf(const SfmModel& model, const RefineOptions& options) {

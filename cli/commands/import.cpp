@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "calib/bundle/refine.h"
 #include "capture/contents_json.h"
 #include "cli/command.h"
 #include "cli/number_checks.h"
@@ -24,6 +25,9 @@ Json ResultJson(const pipeline::ImportReport& report) {
                {"notes", report.notes}};
   for (const auto& [name, reason] : report.skipped) {
     json["skipped"].push_back({{"name", name}, {"reason", reason}});
+  }
+  if (const auto& adjustment = report.calibration.bundle_adjustment) {
+    json["bundle_adjustment"] = Json::parse(calib::ToJson(adjustment->refined));
   }
   json["contents"] = capture::JsonOf(report.contents);
   return json;
@@ -88,6 +92,8 @@ void AddImportCommand(CLI::App& app) {
                          "whole [on]");
         AddMemoryOption(command, options->memory_gb,
                         "Memory for views that are read at a time [4]");
+        command.add_flag("--refine", options->refine,
+                         "Adjust the cameras where held-out observations of the photos gain");
         command.add_flag("--allow-missing", options->allow_missing,
                          "Leave out cameras whose photo is not there, instead of failing");
         command

@@ -5,11 +5,9 @@
 #include <algorithm>
 #include <map>
 
-#include "calib/bundle/refine.h"
 #include "calib/colmap/held_out.h"
 #include "calib/colmap/known_poses.h"
 #include "calib/colmap/model_io.h"
-#include "calib/sparse_from_sfm.h"
 #include "capture/sfm_images.h"
 #include "dtr/base/error.h"
 #include "dtr/base/file_names.h"
@@ -94,6 +92,44 @@ Given GivenIn(const io::CameraList& list) {
   return given;
 }
 
+// Adjusts the cameras where that pays. `are_independent`: of the observations (RefineGivenOptions).
+void RefineWhereAsked(const CalibrateOptions& options, bool are_independent,
+                      CalibratedPhotos& calibrated, Progress& progress) {
+  calibrated.report.points = calibrated.model.points.size();
+  if (!options.refine_poses) return;
+  calibrated.report.bundle_adjustment = {
+      .refined = RefineGiven(
+          calibrated.model,
+          {.are_independent = are_independent, .threads = options.threads, .seed = options.seed},
+          progress),
+      .metres = {}};
+}
+
+// The test of cameras that bring points. Nothing where there is too little to test with.
+std::optional<calib::ConventionReport> TestOfModel(const calib::SfmModel& model,
+                                                   const capture::Capture& photos,
+                                                   const CalibrateOptions& options,
+                                                   const fs::path& workspace, Progress& progress) {
+  std::map<std::string, size_t> photo_of;
+  for (size_t i = 0; i < photos.photos.size(); ++i) photo_of[photos.photos[i].name] = i;
+  GivenPhotos given{options.poses.filename().string(), {}, workspace, SfmOptionsFor(options)};
+  std::vector<bool> may;
+  for (const calib::SfmImage& image : model.images) {
+    const size_t photo = photo_of.at(image.name);
+    may.push_back(!options.held_out[photo]);
+    given.images.push_back({image.name, model.cameras.at(image.camera_id), image.cam_from_world,
+                            capture::SfmMaskFile(workspace / "photos", photos.photos[photo])});
+  }
+  const std::vector<size_t> some = ImagesToTest(model, may);
+  capture::Capture tested;
+  for (const size_t i : some) {
+    tested.photos.push_back(photos.photos[photo_of.at(model.images[i].name)]);
+  }
+  PreparePhotos(tested, options, workspace / "photos", progress);
+  const calib::ConventionReport report = TestWithPoints(model, given, some, progress);
+  return report.tested() ? std::optional(report) : std::nullopt;
+}
+
 // Points for cameras that came without any: COLMAP finds them with everything else held.
 CalibratedPhotos Triangulated(const Given& given, const capture::Capture& capture,
                               const CalibrateOptions& options, const fs::path& workspace,
@@ -123,6 +159,7 @@ CalibratedPhotos Triangulated(const Given& given, const capture::Capture& captur
   for (const colmap::PosedImage& posed : held_out) {
     AddImage({0, posed.name, 0, posed.cam_from_world, {}}, posed.camera, calibrated.model);
   }
+  RefineWhereAsked(options, true, calibrated, progress);
   return calibrated;
 }
 
@@ -149,7 +186,7 @@ CalibratedPhotos FromModel(calib::SfmModel model, Given given, const capture::Ca
     }
     return Triangulated(given, capture, options, workspace, progress);
   }
-  calibrated.model = std::move(model);
+  calibrated = WithPointsOfFile(std::move(model), capture, options, workspace, progress);
   calibrated.unit = given.unit;
   calibrated.world_origin = given.world_origin;
   return calibrated;
@@ -272,24 +309,6 @@ PosesFile FromForeign(const std::vector<io::SizedImage>& images, const CameraFor
   return file;
 }
 
-// Bundle adjustment where it pays.
-void RefineGiven(const CalibrateOptions& options, CalibratedPhotos& calibrated,
-                 Progress& progress) {
-  progress.Stage("bundle adjustment", 0);
-  calib::RefineOptions refine;
-  refine.threads = options.threads;
-  refine.seed = options.seed;
-  refine.progress = &progress;
-  calib::Refined refined = calib::Refine(calibrated.model, refine);
-  progress.Note(refined.changed
-                    ? fmt::format("given cameras are adjusted: held-out observations lie {:.3g} px "
-                                  "from where they are predicted, {:.3g} px with the given ones",
-                                  refined.adjusted_px, refined.given_px)
-                    : "given cameras stay as they are: " + refined.reason);
-  calibrated.report.bundle_adjustment = {.refined = refined, .metres = {}};
-  calibrated.model = std::move(refined.model);
-}
-
 }  // namespace
 
 PosesFile ReadPoses(const capture::Capture& capture, const fs::path& poses,
@@ -317,20 +336,23 @@ PosesFile ReadPoses(const capture::Capture& capture, const fs::path& poses,
   return file;
 }
 
-SparseScene TriangulatedPoints(const io::CameraList& list, const capture::Capture& photos,
-                               const CalibrateOptions& options, const fs::path& workspace,
-                               calib::ConventionReport& conventions, Progress& progress) {
+CalibratedPhotos WithPointsOfPhotos(const io::CameraList& list, const capture::Capture& photos,
+                                    const CalibrateOptions& options, const fs::path& workspace,
+                                    Progress& progress) {
   progress.Note("points are triangulated from the photos, with their cameras fixed");
-  const CalibratedPhotos calibrated =
-      Triangulated(GivenIn(list), photos, options, workspace, progress);
-  if (calibrated.report.given_cameras) conventions = *calibrated.report.given_cameras;
-  std::vector<std::string> names;
-  std::vector<PinholeCamera> pinholes;
-  for (const io::NamedCamera& named : list.cameras) {
-    names.push_back(named.name);
-    pinholes.push_back(named.camera);
-  }
-  return calib::ToSparseScene(calibrated.model, names, pinholes);
+  return Triangulated(GivenIn(list), photos, options, workspace, progress);
+}
+
+CalibratedPhotos WithPointsOfFile(calib::SfmModel model, const capture::Capture& photos,
+                                  const CalibrateOptions& options, const fs::path& workspace,
+                                  Progress& progress) {
+  CalibratedPhotos calibrated;
+  calibrated.model = std::move(model);
+  if (options.part) return calibrated;  // whoever ends the build tests and adjusts
+  calibrated.report.given_cameras =
+      TestOfModel(calibrated.model, photos, options, workspace, progress);
+  RefineWhereAsked(options, false, calibrated, progress);
+  return calibrated;
 }
 
 void RegisterHeldOutPhotos(const capture::Capture& held_out,
@@ -357,8 +379,6 @@ CalibratedPhotos FromKnownPoses(const capture::Capture& capture, const Calibrate
   CalibratedPhotos calibrated = IsColmapModel(options.poses, options.poses_format)
                                     ? FromColmapModel(capture, options, workspace, progress)
                                     : FromCameraList(capture, options, workspace, progress);
-  calibrated.report.points = calibrated.model.points.size();
-  if (options.refine_poses) RefineGiven(options, calibrated, progress);
   return calibrated;
 }
 

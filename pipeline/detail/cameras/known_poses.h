@@ -7,7 +7,6 @@
 
 #include "calib/colmap/sfm.h"
 #include "dtr/io/formats/cameras_json.h"
-#include "dtr/types/sparse_scene.h"
 #include "pipeline/calibrate.h"
 #include "pipeline/detail/photos/camera_groups.h"
 
@@ -40,14 +39,18 @@ struct PosesFile {
 PosesFile ReadPoses(const capture::Capture& capture, const std::filesystem::path& poses,
                     const std::string& format);
 
-/// Points that photos show, triangulated with the cameras of `list` held fixed; views are indices
-/// into it. `conventions`: what the test of the cameras said (given_cameras.h). Of `options`
-/// threads, seed, memory and held_out (for each photo) are used; photos that are held out give no
-/// points.
-SparseScene TriangulatedPoints(const io::CameraList& list, const capture::Capture& photos,
-                               const CalibrateOptions& options,
-                               const std::filesystem::path& workspace,
-                               calib::ConventionReport& conventions, Progress& progress);
+/// The cameras of `list`, tested (given_cameras.h), with the points that photos show, triangulated
+/// with the cameras fixed. With options.refine_poses they are then adjusted where that pays. Of
+/// `options` threads, seed, memory, poses, sfm, refine_poses and held_out (for each photo) are
+/// used; photos that are held out give no points, unless cameras are to be adjusted.
+CalibratedPhotos WithPointsOfPhotos(const io::CameraList& list, const capture::Capture& photos,
+                                    const CalibrateOptions& options,
+                                    const std::filesystem::path& workspace, Progress& progress);
+
+/// The same of cameras whose file brings the points: `model`, of `photos`.
+CalibratedPhotos WithPointsOfFile(calib::SfmModel model, const capture::Capture& photos,
+                                  const CalibrateOptions& options,
+                                  const std::filesystem::path& workspace, Progress& progress);
 
 /// Cameras from options.poses: the folder of a COLMAP model, or a file as of ReadPoses.
 /// Where these bring no points, points are triangulated with the cameras held fixed, from photos

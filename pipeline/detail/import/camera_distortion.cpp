@@ -58,6 +58,12 @@ calib::LensCamera CameraModelOf(const io::NamedCamera& named) {
   return camera;
 }
 
+void SetCameraModel(io::NamedCamera& named, const calib::LensCamera& lens) {
+  named.camera = lens.Pinhole();
+  named.distortion.reset();
+  if (!lens.IsUndistorted()) named.distortion = {calib::NameOf(lens.model), lens.params};
+}
+
 std::unique_ptr<CameraDistortion> DistortionOf(const io::NamedCamera& named) {
   return std::make_unique<LensDistortion>(named);
 }

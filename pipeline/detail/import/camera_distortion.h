@@ -11,6 +11,9 @@ namespace dtr::pipeline {
 /// cannot be.
 calib::LensCamera CameraModelOf(const io::NamedCamera& named);
 
+/// The reverse: gives `named` this camera.
+void SetCameraModel(io::NamedCamera& named, const calib::LensCamera& lens);
+
 /// For ImportOptions::distortion_of. Throws as CameraModelOf.
 std::unique_ptr<CameraDistortion> DistortionOf(const io::NamedCamera& named);
 

@@ -7,7 +7,6 @@
 #include <set>
 
 #include "calib/colmap/model_io.h"
-#include "calib/sparse_from_sfm.h"
 #include "capture/ingest.h"
 #include "dtr/base/error.h"
 #include "dtr/base/file_names.h"
@@ -17,6 +16,7 @@
 #include "dtr/io/image_io.h"
 #include "pipeline/detail/cameras/camera_formats.h"
 #include "pipeline/detail/cameras/foreign_cameras.h"
+#include "pipeline/detail/import/camera_distortion.h"
 #include "pipeline/detail/import/rgbd_files.h"
 #include "pipeline/detail/photos/holdout.h"
 #include "pipeline/detail/photos/named_files.h"
@@ -79,7 +79,7 @@ void TellMissing(const fs::path& file, const CameraFileFolders& folders, size_t 
 
 CamerasFromFile FromColmap(const fs::path& folder, const CameraFileFolders& folders) {
   const fs::path model_folder = colmap::ModelFolderIn(folder);
-  calib::SfmModel model = colmap::ReadModel(model_folder);
+  calib::SfmModel model = ReadGivenModel(folder);
   CamerasFromFile cameras;
   const size_t all = model.images.size();
   for (calib::SfmImage& image : model.images) image.name = NameBelow(folders.images, image.name);
@@ -90,28 +90,15 @@ CamerasFromFile FromColmap(const fs::path& folder, const CameraFileFolders& fold
     return true;
   });
   TellMissing(model_folder, folders, all, cameras);
-  std::vector<std::string> names;
-  std::vector<PinholeCamera> pinholes;
   for (const calib::SfmImage& image : model.images) {
-    const calib::LensCamera& lens = model.cameras.at(image.camera_id);
     io::NamedCamera named;
     named.name = image.name;
-    named.camera = lens.Pinhole();
-    if (!lens.IsUndistorted()) named.distortion = {calib::NameOf(lens.model), lens.params};
+    SetCameraModel(named, model.cameras.at(image.camera_id));
     named.cam_from_world = image.cam_from_world;
-    names.push_back(image.name);
-    pinholes.push_back(named.camera);
     cameras.list.cameras.push_back(named);
   }
   cameras.list.photo_grid = GridOfModel(model_folder);
-  if (model.points.empty()) return cameras;
-  cameras.points = calib::ToSparseScene(model, names, pinholes);
-  const size_t used = cameras.points->points.size();
-  if (used < model.points.size()) {
-    cameras.notes.push_back(
-        fmt::format("{}: {} of its {} points are not used, fewer than two of the photos see them",
-                    model_folder.string(), model.points.size() - used, model.points.size()));
-  }
+  if (!model.points.empty()) cameras.model = std::move(model);
   return cameras;
 }
 
@@ -202,14 +189,7 @@ CamerasFromFile FromForeign(const fs::path& file, const CameraFormat& format,
   for (auto& [path, reason] : placed.left_out) {
     cameras.skipped.emplace_back(Printable(path), std::move(reason));
   }
-  if (!placed.model) return cameras;
-  std::vector<std::string> names;
-  std::vector<PinholeCamera> pinholes;
-  for (const io::NamedCamera& named : cameras.list.cameras) {
-    names.push_back(named.name);
-    pinholes.push_back(named.camera);
-  }
-  cameras.points = calib::ToSparseScene(*placed.model, names, pinholes);
+  cameras.model = std::move(placed.model);
   return cameras;
 }
 

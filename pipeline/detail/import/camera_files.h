@@ -6,15 +6,17 @@
 #include <string>
 #include <vector>
 
+#include "calib/sfm_model.h"
 #include "dtr/io/formats/cameras_json.h"
-#include "dtr/types/sparse_scene.h"
 
 namespace dtr::pipeline {
 
 /// Cameras with what else their file brings.
 struct CamerasFromFile {
   io::CameraList list = {};
-  std::optional<SparseScene> points = {};  ///< views are indices into `list`
+  /// Images named and posed as in `list`, with points, where the file says which photos show them;
+  /// images in order of their names.
+  std::optional<calib::SfmModel> model = {};
   /// Where masks that the file names lie; empty: `masks` beside the images.
   std::filesystem::path mask_dir = {};
   /// Where images and depth maps of a capture lie; empty: the request says.

@@ -184,7 +184,10 @@ nlohmann::json Inputs(const io::CameraList& list, const ImportOptions& options,
   inputs["made_by"] = "import";
   inputs["photos"] = photos;
   inputs["depth_unit"] = options.depth_unit.value_or(1.0);
-  if (options.conventions) inputs["calibration"]["given_cameras"] = JsonOf(*options.conventions);
+  const CalibrationReport& calibration = options.calibration;
+  if (calibration.given_cameras || calibration.bundle_adjustment) {
+    inputs["calibration"] = JsonOf(calibration);
+  }
   return inputs;
 }
 

@@ -8,12 +8,12 @@
 #include <string>
 #include <vector>
 
-#include "calib/validation/conventions.h"
 #include "dtr/base/progress.h"
 #include "dtr/io/formats/cameras_json.h"
 #include "dtr/io/image_io.h"
 #include "dtr/types/sparse_scene.h"
 #include "dtr/types/view.h"
+#include "pipeline/calibration_report.h"
 
 namespace dtr::pipeline {
 
@@ -50,8 +50,8 @@ struct ImportOptions {
   /// Views in memory at a time take at most so many 1e9 bytes (one alone may be larger); 0: no
   /// bound.
   double memory_gb = 0;
-  /// What a test of the cameras said, for the set's provenance; decides nothing.
-  std::optional<calib::ConventionReport> conventions = {};
+  /// What tests and adjustment of the cameras gave, for the set's provenance; decides nothing.
+  CalibrationReport calibration = {};
   bool completion = false;  ///< of depth that comes with the views (CompleteDepth)
 };
 
