@@ -7,14 +7,16 @@
 #include <cmath>
 #include <set>
 
-#include "calib/colmap/model_io.h"
 #include "dtr/base/error.h"
 #include "dtr/io/formats/cameras_json.h"
+#include "dtr/io/formats/llff.h"
+#include "dtr/io/formats/npy.h"
 #include "dtr/io/formats/rgbd_capture.h"
 #include "dtr/io/formats/transforms_json.h"
 #include "dtr/render/camera_path.h"
 #include "pipeline/detail/cameras/camera_formats.h"
 #include "pipeline/detail/cameras/foreign_cameras.h"
+#include "pipeline/detail/import/camera_distortion.h"
 #include "pipeline/detail/photos/named_files.h"
 #include "pipeline/view_names.h"
 
@@ -42,15 +44,23 @@ io::CameraList FromTransforms(const std::filesystem::path& file) {
     const auto image = FindImage(folder, path);
     return image ? *image : io::SizedImage{path};
   };
-  io::CameraList list = io::ReadTransformsJson(file, paths).list;
-  for (const io::NamedCamera& named : list.cameras) {
-    if (!named.distortion) continue;
-    throw Error(
-        fmt::format("{}: camera of {} has distortion, and views are rendered without; take "
-                    "its k1 and the like out of the file for a view as if undistorted",
-                    file.string(), named.name));
+  return io::ReadTransformsJson(file, paths).list;
+}
+
+// Poses and sizes of LLFF's file, whose rows have no names: they are counted.
+io::CameraList FromLlff(const std::filesystem::path& file) {
+  constexpr size_t kRow = 17, kHeight = 4, kWidth = 9;
+  const io::NpyArray rows = io::ReadNpy(file);
+  std::vector<io::SizedImage> images;
+  const bool is_table = rows.shape.size() == 2 && rows.shape[1] == kRow;
+  for (size_t i = 0; is_table && i < rows.shape[0]; ++i) {
+    const auto side = [&](size_t at) {
+      const double px = rows.values[i * kRow + at];
+      return px >= 1 && px <= io::kMaxImageSidePx ? static_cast<int>(px) : 1;
+    };
+    images.push_back({fmt::format("{:06}", i), side(kWidth), side(kHeight)});
   }
-  return list;
+  return io::ReadLlff(file, std::move(images)).list;  // whatever is wrong is said there
 }
 
 // Cameras of any program, with the size that their file says. A COLMAP model's are as they are.
@@ -60,22 +70,16 @@ io::CameraList ReadCameras(const std::filesystem::path& file) {
   if (kind == "cameras-json") return io::ReadCamerasJson(file);
   if (kind == "nerf") return FromTransforms(file);
   if (io::IsRgbdFormat(kind)) return io::ReadRgbdCapture(file, kind).list;
-  if (kind == "llff") {
-    throw UsageError(file.string() +
-                     ": its cameras have no names and no photos here; give a "
-                     "cameras.json");
-  }
+  if (kind == "llff") return FromLlff(file);
   io::CameraList list;
   if (format.read != nullptr) {
     list = CamerasWithoutPhotos(format.read(file), file.string());
   } else {
-    const calib::SfmModel model = colmap::ReadModel(colmap::ModelFolderIn(file));
+    const calib::SfmModel model = ReadGivenModel(file);
     for (const calib::SfmImage& image : model.images) {
       io::NamedCamera named;
       named.name = image.name;
-      const calib::LensCamera& lens = model.cameras.at(image.camera_id);
-      named.camera = lens.Pinhole();
-      if (!lens.IsUndistorted()) named.distortion = {calib::NameOf(lens.model), lens.params};
+      SetCameraModel(named, model.cameras.at(image.camera_id));
       named.cam_from_world = image.cam_from_world;
       list.cameras.push_back(named);
     }

@@ -215,14 +215,25 @@ TEST_F(FieldScene, FoldersAndPathsMayBothNameTheSubfolder) {
   EXPECT_EQ(io::ReadSet(Set()).frames[0].views.size(), 6u);
 }
 
-TEST_F(FieldScene, ATransformsJsonWithDistortionIsNoViewToRender) {
+TEST_F(FieldScene, ATransformsJsonWithDistortionIsRenderedAsIfUndistorted) {
   DtrOk(Import(Field("_scene") / "transforms_dfull.json"));
   const fs::path dist = Field("_scene") / "transforms_dist.json";
   const std::string frames = (folder_ / "frames").string();
-  ExpectRejected(Dtr({"render", Set(), "--path", dist.string(), "-o", frames}), kFailed,
-                 "has distortion, and views are rendered without");
-  DtrOk({"render", Set(), "--path", Changed("transforms_dist.json", {{"k1", 0}}).string(),
-         "--renderer", "cpu", "--size", "60x45", "-o", frames});
+  const Ran ran = DtrOk({"render", Set(), "--path", dist.string(), "--renderer", "cpu", "--size",
+                         "60x45", "-o", frames});
+  EXPECT_THAT(ran.err, HasSubstr("of its cameras have distortion; frames are rendered without"));
+  EXPECT_TRUE(fs::exists(fs::path(frames) / "frame_00000.png"));
+}
+
+TEST_F(FieldScene, CamerasWithoutASizeAreNoViewsToRender) {
+  DtrOk(Import(Field("_scene") / "transforms_dfull.json"));
+  Json file = Json::parse(Text(Field("_scene") / "transforms_dist.json"));
+  for (const char* key : {"w", "h"}) file.erase(key);
+  for (Json& frame : file["frames"]) frame["file_path"] = "not/there.jpg";
+  std::ofstream(folder_ / "sizeless.json") << file.dump();
+  ExpectRejected(Dtr({"render", Set(), "--path", (folder_ / "sizeless.json").string(), "-o",
+                      (folder_ / "frames").string()}),
+                 kFailed, "says no size (w and h) and its image is not there");
 }
 
 TEST_F(FieldScene, WhatAModelOrAFolderHoldsAndIsNotUsedIsCounted) {
