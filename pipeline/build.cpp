@@ -16,6 +16,7 @@
 #include "dtr/base/machine.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/eval/json.h"
+#include "dtr/io/hand_over.h"
 #include "dtr/io/run_record_json.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/validation_result.h"
@@ -352,6 +353,8 @@ BuildReport BuildOrPart(const BuildOptions& options, Progress& listener) {
           FeatureImageSizePx(sizes, memory_gb, options.sfm.feature_size_px);
     }
   }
+  const std::string before_depth = BeforeDepth(options, fingerprint).dump();
+  if (!options.part) io::HandOver(options.output, before_depth, fingerprint.dump());
   io::SetWriter writer = share.OpenWriter(options, fingerprint.dump());
   share.Lock(writer.work_folder());
   if (!options.force_stage.empty()) ForgetStage(writer.folder(), options.force_stage);
@@ -432,6 +435,12 @@ BuildReport BuildOrPart(const BuildOptions& options, Progress& listener) {
   depth_options.seed = options.seed;
   depth_options.photos = PhotoCamerasOf(calibrated, views);
   depth_options.part = share.Depth();
+  depth_options.keep_work = [&] {
+    io::HandOver(options.output, fingerprint.dump(), before_depth);
+    progress.Note(
+        "cameras and undistorted photos are kept: the same command with another `depth_prior`, or "
+        "none, continues");
+  };
   const DepthStageResult stage =
       DepthStage(set, sparse, options.depth, quality, depth_options, writer, progress);
   report.prior = stage.prior;

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "dtr/base/files.h"
+#include "dtr/io/hand_over.h"
 #include "dtr/io/json_fields.h"
 #include "dtr/io/set_json.h"
 
@@ -184,6 +185,19 @@ void PartialSet::ExpectFingerprint(const std::string& fingerprint) const {
   throw UsageError(partial.string() + ": expected work of the same inputs and options, found " +
                    "others" + (differ.empty() ? "" : " (" + differ + " differ)") +
                    "; run that command again to finish it, or delete the folder");
+}
+
+void PartialSet::HandOver(const std::string& from_json, const std::string& to_json) const {
+  const std::string from = Canonical(from_json, "fingerprint");
+  const std::string to = Canonical(to_json, "fingerprint");
+  if (!fs::exists(partial / kFingerprint)) return;
+  if (ReadFile(partial / kFingerprint, kRecordLimitBytes) != from) return;
+  WriteFileAtomically(partial / kFingerprint, to);
+}
+
+void HandOver(const fs::path& target, const std::string& from_json, const std::string& to_json) {
+  const PartialSet set(target, false);
+  AsError([&] { set.HandOver(from_json, to_json); });
 }
 
 void PartialSet::MoveIntoPlace() {

@@ -47,6 +47,8 @@ struct PartialSet {
   void Open(const std::string& fingerprint_json);
   /// Goes on in a folder that another process has made.
   void Join(const std::string& fingerprint_json);
+  /// io::HandOver of this folder (hand_over.h).
+  void HandOver(const std::string& from_json, const std::string& to_json) const;
   /// Renames the folder to `target`, and what was there aside and away.
   void MoveIntoPlace();
   /// Takes the folder away where nothing was done in it.

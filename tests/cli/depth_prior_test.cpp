@@ -150,6 +150,45 @@ TEST_F(DepthPrior, AWrongPriorIsNamed) {
                  "its maps do not show what the photos show: at");
 }
 
+TEST_F(DepthPrior, ARejectedPriorLeavesTheCamerasForTheNextCommand) {
+  const auto build = [&](const std::string& folder, std::vector<std::string> further) {
+    fs::create_directories(folder_ / folder);
+    std::vector<std::string> args = {"build",
+                                     (*shared_ / "courtyard/images").string(),
+                                     "--poses",
+                                     (*shared_ / "courtyard/cameras.json").string(),
+                                     "-o",
+                                     In(folder + "/built.dtr"),
+                                     "--preset",
+                                     "fast",
+                                     "--rounds",
+                                     "0",
+                                     "--no-completion"};
+    args.insert(args.end(), further.begin(), further.end());
+    return Dtr(args);
+  };
+  const fs::path partial = In("a/built.dtr.partial");
+  const fs::path model = partial / "work/calibration/sfm/model/points3D.bin";
+  const Ran first = build("a", {"--depth-prior", Maps("mm", Scaled(1000))});
+  ExpectRejected(first, kFailed, "are its numbers millimetres? give --prior-unit 0.001");
+  EXPECT_THAT(first.err, HasSubstr("cameras and undistorted photos are kept"));
+  ASSERT_TRUE(fs::exists(model));
+  const auto made = fs::last_write_time(model);
+  // Another choice of depth goes on, whichever it is, and is rejected as before.
+  ExpectRejected(build("a", {"--depth-prior", In("mm"), "--engine", "prior"}), kFailed,
+                 "are its numbers millimetres?");
+  EXPECT_EQ(fs::last_write_time(model), made);
+  // Other photos or cameras do not.
+  ExpectRejected(build("a", {"--holdout", "0003.jpg"}), kWrongUsage,
+                 "expected work of the same inputs and options, found others");
+  EXPECT_EQ(build("a", {}).code, 0);
+  EXPECT_FALSE(fs::exists(partial));
+  // Nothing of what was rejected is left.
+  EXPECT_EQ(build("b", {}).code, 0);
+  EXPECT_THAT(DifferingFiles(Contents(In("a/built.dtr")), Contents(In("b/built.dtr"))),
+              ::testing::IsEmpty());
+}
+
 TEST_F(DepthPrior, APriorThatCannotBeUsedIsNamed) {
   const std::string maps = GoodMaps();
   ExpectRejected(Stereo(maps, "a.dtr", {"--engine", "sgbm"}), kWrongUsage,

@@ -246,7 +246,7 @@ DepthStageResult DepthStage(DtrSet& set, const SparseScene& sparse, const DepthC
       throw;
     } catch (const Error&) {
       // The command that is corrected must not find this one's work in its way.
-      writer.Discard();
+      options.keep_work ? options.keep_work() : writer.Discard();
       throw;
     }
     priors->Attach(sources.stereo);

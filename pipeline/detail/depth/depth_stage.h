@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -40,6 +41,9 @@ struct DepthStageOptions {
   /// What other time steps say of the source views; empty: nothing.
   std::vector<stereo::TimeStepSource> time_steps = {};
   bool gains = true;  ///< the views' gains are estimated
+  /// Called before the error of a depth prior that is rejected is thrown, so that what was done
+  /// before may be kept; empty: the writer's work is discarded.
+  std::function<void()> keep_work = {};
   /// Does this alone and throws PartDone; Error where what it needs is missing. Empty: everything.
   std::optional<DepthStagePart> part = {};
 };

@@ -49,6 +49,17 @@ Json OptionsJson(const BuildOptions& options, const stereo::QualitySettings& qua
   return json;
 }
 
+Json BeforeDepth(const BuildOptions& options, Json fingerprint) {
+  BuildOptions any = options;
+  any.depth = {};
+  fingerprint["options"] = OptionsJson(any, QualityOf(any.depth));
+  for (const char* key : {"time_budget_s", "workspace_sha256", "prior_sha256"}) {
+    fingerprint.erase(key);
+  }
+  fingerprint["before_depth"] = true;
+  return fingerprint;
+}
+
 Json ProvenanceJson(const BuildOptions& options, const Json& option_values, const Json& photos,
                     const CalibratedPhotos& calibrated, const BuildReport& report) {
   Json provenance;

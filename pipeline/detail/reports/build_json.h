@@ -11,6 +11,10 @@ namespace dtr::pipeline {
 nlohmann::ordered_json OptionsJson(const BuildOptions& options,
                                    const stereo::QualitySettings& quality);
 
+/// Of `fingerprint`, a build's with its options under `options`, what decides everything before
+/// depth: the same for any choice of depth, and no build's own.
+nlohmann::ordered_json BeforeDepth(const BuildOptions& options, nlohmann::ordered_json fingerprint);
+
 /// The provenance of the set; `option_values` and `photos` as they stand in it.
 nlohmann::ordered_json ProvenanceJson(const BuildOptions& options,
                                       const nlohmann::ordered_json& option_values,
