@@ -225,6 +225,29 @@ TEST_F(FieldScene, ATransformsJsonWithDistortionIsRenderedAsIfUndistorted) {
   EXPECT_TRUE(fs::exists(fs::path(frames) / "frame_00000.png"));
 }
 
+// Its rows have no names: frames are numbered.
+TEST_F(FieldScene, LlffsCamerasAreRenderedInTheirSize) {
+  DtrOk(Import(Field("_scene") / "transforms_dfull.json"));
+  constexpr int kRows = 2, kWidth = 60, kHeight = 45;
+  std::string npy = "{'descr': '<f8', 'fortran_order': False, 'shape': (2, 17), }";
+  npy.resize(117, ' ');
+  npy = std::string("\x93NUMPY\x01\0\x76\0", 10) + npy + "\n";
+  for (int i = 0; i < kRows; ++i) {
+    const double row[17] = {0,      1, 0, 0.1 * i, kHeight, 1,  0,   0, 0,
+                            kWidth, 0, 0, -1,      0,       50, 0.5, 20};
+    npy.append(reinterpret_cast<const char*>(row), sizeof row);
+  }
+  std::ofstream(folder_ / "poses_bounds.npy", std::ios::binary) << npy;
+  const fs::path frames = folder_ / "frames";
+  DtrOk({"render", Set(), "--path", (folder_ / "poses_bounds.npy").string(), "--renderer", "cpu",
+         "-o", frames.string()});
+  for (const char* name : {"000000.png", "000001.png"}) {
+    const ImageRgb8 frame = io::ReadImage(frames / name);
+    EXPECT_EQ(frame.width(), kWidth);
+    EXPECT_EQ(frame.height(), kHeight);
+  }
+}
+
 TEST_F(FieldScene, CamerasWithoutASizeAreNoViewsToRender) {
   DtrOk(Import(Field("_scene") / "transforms_dfull.json"));
   Json file = Json::parse(Text(Field("_scene") / "transforms_dist.json"));

@@ -48,13 +48,28 @@ std::vector<calib::GivenCamera> CamerasOf(const std::vector<colmap::PosedImage>&
   return cameras;
 }
 
+// What matching without cameras says of its own guesses is nobody's camera.
+class WithoutNotes final : public Progress {
+ public:
+  explicit WithoutNotes(Progress& listener) : listener_(listener) {}
+  void Stage(const std::string& name, int total) override { listener_.Stage(name, total); }
+  void Update(int done) override { listener_.Update(done); }
+  void Note(const std::string&) override {}
+  bool StopRequested() const override { return listener_.StopRequested(); }
+  std::string InterruptedLine() const override { return listener_.InterruptedLine(); }
+
+ private:
+  Progress& listener_;
+};
+
 calib::ConventionReport TestAlone(const GivenPhotos& given,
                                   const std::vector<colmap::PosedImage>& images,
                                   const std::vector<size_t>& some, Progress& progress) {
   std::vector<colmap::PosedImage> matched;
   for (const size_t i : some) matched.push_back(images[i]);
+  WithoutNotes quiet(progress);
   std::vector<calib::MatchedPair> pairs = colmap::MatchWithoutCameras(
-      given.workspace / "photos", matched, given.workspace / "conventions", given.sfm, progress);
+      given.workspace / "photos", matched, given.workspace / "conventions", given.sfm, quiet);
   for (calib::MatchedPair& pair : pairs) {
     pair.a = static_cast<int>(some[static_cast<size_t>(pair.a)]);
     pair.b = static_cast<int>(some[static_cast<size_t>(pair.b)]);
