@@ -44,7 +44,8 @@ class Stubs(unittest.TestCase):
                 continue
             written = {n.name for n in stub.body if isinstance(n, ast.FunctionDef)}
             written |= {n.target.id for n in stub.body if isinstance(n, ast.AnnAssign)}
-            there = {n for n in vars(kind) if not n.startswith("__")}
+            # pybind11 2.13 gives its classes a method for other modules, which is not part of ours.
+            there = {n for n in vars(kind) if not n.startswith(("__", "_pybind11_"))}
             self.assertEqual(there | {"__init__"} if "__init__" in written else there, written, name)
             for member in stub.body:
                 if not isinstance(member, ast.FunctionDef):
