@@ -15,7 +15,7 @@ function(dtr_compile_options target)
   set(strict ${DTR_WARNINGS_AS_ERRORS})
   if(strict STREQUAL AUTO)
     set(strict OFF)  # sanitized code makes GCC warn of what is not there
-    if(NOT DTR_SANITIZE AND CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION MATCHES "^12\\.")
+    if(NOT DTR_SANITIZE AND CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION MATCHES "^1[24]\\.")
       set(strict ON)
     endif()
   endif()

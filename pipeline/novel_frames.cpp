@@ -65,7 +65,7 @@ io::CameraList FromLlff(const std::filesystem::path& file) {
 
 // Cameras of any program, with the size that their file says. A COLMAP model's are as they are.
 io::CameraList ReadCameras(const std::filesystem::path& file) {
-  const CameraFormat& format = FormatOf(file, "", "cameras");
+  const CameraFormat format = FormatOf(file, "", "cameras");
   const std::string kind = format.name;
   if (kind == "cameras-json") return io::ReadCamerasJson(file);
   if (kind == "nerf") return FromTransforms(file);

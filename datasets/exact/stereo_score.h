@@ -4,6 +4,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 #include <vector>
 
@@ -121,8 +122,8 @@ inline DepthEstimate WholeRun(const std::vector<StereoView>& views, const DepthR
   std::vector<int> all(views.size());
   std::iota(all.begin(), all.end(), 0);
   for (size_t v = 0; v < views.size(); ++v) {
-    neighbours[v].views = all;
-    neighbours[v].views.erase(neighbours[v].views.begin() + static_cast<std::ptrdiff_t>(v));
+    std::copy_if(all.begin(), all.end(), std::back_inserter(neighbours[v].views),
+                 [v](int other) { return other != static_cast<int>(v); });
   }
   const Collection collection{views, neighbours, ranges, engine.get(), {.threads = threads}};
   PlaneMapsInMemory planes;

@@ -112,7 +112,8 @@ py::dict UnprojectView(const SetView& view, bool completed) {
 
 // ---- cameras
 
-NovelFrame MakeCamera(const RowMajor3d& k, const RowMajor4d& cam_from_world, int width, int height,
+NovelFrame MakeCamera(const Eigen::Ref<const RowMajor3d>& k,
+                      const Eigen::Ref<const RowMajor4d>& cam_from_world, int width, int height,
                       const std::string& name) {
   return {name, CameraFrom(k, width, height, "Camera"), PoseFrom(cam_from_world, "Camera")};
 }

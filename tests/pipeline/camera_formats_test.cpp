@@ -49,7 +49,7 @@ PhotoNames NamesIn(const TrueCapture& capture) {
 }
 
 PlacedCameras Placed(const SourceProgram& program, const TrueCapture& capture) {
-  const CameraFormat& format = FormatOf(program.file, "", "`cameras`");
+  const CameraFormat format = FormatOf(program.file, "", "`cameras`");
   return PlaceCameras(format.read(program.file), program.file.string(), NamesIn(capture), PhotoOf);
 }
 
@@ -212,7 +212,7 @@ TEST(CameraFormats, EveryPrefixOfAFileIsAnError) {
   for (const SourceProgram& program : WriteAllPrograms(capture, folder.path())) {
     if (program.format == "mvsnet") continue;  // behind the cameras stands what is not used
     SCOPED_TRACE(program.format + " " + program.variant);
-    const CameraFormat& format = FormatOf(program.file, "", "x");
+    const CameraFormat format = FormatOf(program.file, "", "x");
     std::string text = ReadFile(program.file, 1 << 24);
     if (program.format == "nvm") {  // what stands behind the points may be absent
       text.erase(text.find("\n0\n\n#"));
@@ -317,7 +317,7 @@ TEST_F(Changed, NamesThatMeanTwoPhotosOrOneTwiceAreRejected) {
   EXPECT_THAT(Says("realityscan", "older", "00000001.jpg", "00000000.jpg"),
               AllOf(HasSubstr("line 4"), HasSubstr("means the photo 00000000.jpg, which line 3")));
   const SourceProgram program = WriteAllPrograms(capture_, folder_.path()).front();
-  const CameraFormat& format = FormatOf(program.file, "", "x");
+  const CameraFormat format = FormatOf(program.file, "", "x");
   EXPECT_THAT(MessageOf<Error>([&] {
                 PlaceCameras(format.read(program.file), "cameras.xml",
                              PhotoNames({"a/00000000.jpg", "b/00000000.jpg"}), PhotoOf);

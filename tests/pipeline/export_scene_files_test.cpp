@@ -279,7 +279,7 @@ TEST_F(ExportOfExactScene, MvsnetAndImmersiveVideoAreReadAsTheCamerasOfTheSet) {
       {"mvsnet", Request("mvsnet").output}, {"miv", Request("miv").output / "sequence.json"}};
   for (const auto& [format, file] : exports) {
     SCOPED_TRACE(format);
-    const pipeline::CameraFormat& recognised = pipeline::FormatOf(file, "", "`cameras`");
+    const pipeline::CameraFormat recognised = pipeline::FormatOf(file, "", "`cameras`");
     ASSERT_EQ(std::string(recognised.name), format);
     std::map<std::string, const View*> view_of;
     std::vector<std::string> names;

@@ -260,19 +260,20 @@ SequenceCamera Open3dCameraOf(const fs::path& folder, PinholeCamera* full, RgbdC
   for (const std::string& name : NamesIn(folder)) {
     const fs::path file = folder / name;
     if (file.extension() != ".json" || name.find("intrinsic") == std::string::npos) continue;
-    const Json json = ParseJson(ReadFile(file, kMaxTextBytes), file.string());
-    const Json& numbers = Field(json, "intrinsic_matrix", file.string());
+    const std::string where = file.string();
+    const Json json = ParseJson(ReadFile(file, kMaxTextBytes), where);
+    const Json& numbers = Field(json, "intrinsic_matrix", where);
     if (!numbers.is_array() || numbers.size() != 9) {
-      throw Error(file.string() + ": intrinsic_matrix: expected 9 numbers, found another list");
+      throw Error(where + ": intrinsic_matrix: expected 9 numbers, found another list");
     }
     Eigen::Matrix3d k;  // column by column
     for (int i = 0; i < 9; ++i) {
-      k(i % 3, i / 3) = NumberFrom(numbers[static_cast<size_t>(i)], file.string());
+      k(i % 3, i / 3) = NumberFrom(numbers[static_cast<size_t>(i)], where);
     }
-    *full = CameraFromK(k, IntField(json, "width", 1, kMaxImageSidePx, file.string()),
-                        IntField(json, "height", 1, kMaxImageSidePx, file.string()),
-                        PixelOrigin::kCentre, file.string());
-    return {k, {}, file.string()};
+    *full = CameraFromK(k, IntField(json, "width", 1, kMaxImageSidePx, where),
+                        IntField(json, "height", 1, kMaxImageSidePx, where), PixelOrigin::kCentre,
+                        where);
+    return {k, {}, where};
   }
   capture.notes.push_back(
       folder.string() +

@@ -188,8 +188,7 @@ std::vector<std::string> CameraFormats() {
   return names;
 }
 
-const CameraFormat& FormatOf(const fs::path& file, const std::string& name,
-                             const std::string& what) {
+CameraFormat FormatOf(const fs::path& file, const std::string& name, const std::string& what) {
   if (!fs::exists(file)) {
     throw UsageError(fmt::format("{} {}: no such file or folder", what, file.string()));
   }

@@ -27,8 +27,8 @@ std::span<const CameraFormat> CameraFormatTable();
 /// The format called `name`, or the one that the content shows where it is empty; `what` is the
 /// option in messages. Throws UsageError where there is no such file or format, or the file looks
 /// like none, Error where a folder does: then all formats are listed, and what it is instead.
-const CameraFormat& FormatOf(const std::filesystem::path& file, const std::string& name,
-                             const std::string& what);
+CameraFormat FormatOf(const std::filesystem::path& file, const std::string& name,
+                      const std::string& what);
 
 /// Whether that is a COLMAP model; false too where the format cannot be told.
 bool IsColmapModel(const std::filesystem::path& file, const std::string& name);

@@ -320,7 +320,7 @@ PosesFile ReadPoses(const capture::Capture& capture, const fs::path& poses,
     images.push_back({photo.name, stored.width_px, stored.height_px,
                       photo.as_stored ? 1 : photo.exif_orientation});
   }
-  const CameraFormat& chosen = FormatOf(poses, format, "`poses`");
+  const CameraFormat chosen = FormatOf(poses, format, "`poses`");
   const std::string kind = chosen.name;
   if (chosen.read != nullptr) return FromForeign(images, chosen, capture, poses);
   if (kind == "nerf") return FromTransforms(images, capture, poses);

@@ -197,7 +197,7 @@ CamerasFromFile FromForeign(const fs::path& file, const CameraFormat& format,
 
 CamerasFromFile ReadCameraFile(const fs::path& file, const std::string& format,
                                const CameraFileFolders& folders) {
-  const CameraFormat& chosen = FormatOf(file, format, "`cameras`");
+  const CameraFormat chosen = FormatOf(file, format, "`cameras`");
   const std::string kind = chosen.name;
   if (chosen.read != nullptr) return FromForeign(file, chosen, folders);
   if (kind == "colmap") return FromColmap(file, folders);
