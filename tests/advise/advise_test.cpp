@@ -40,7 +40,7 @@ Advice AdviseOn(const std::vector<CoarseView>& views, const AdviseOptions& optio
   return Advise(views, options, progress);
 }
 
-const Place& PlaceCalled(const Advice& advice, const std::string& where) {
+Place PlaceCalled(const Advice& advice, const std::string& where) {
   for (const Place& place : advice.places) {
     if (place.where == where) return place;
   }
@@ -62,12 +62,12 @@ TEST(Advise, AnglesAreThoseOfTheWorld) {
   // Half-way between two cameras 2 apart, each wall point is seen from 1 further left or right.
   const auto views = Row(Plane({0, 0, 1}, kWallZ), {0, 2});
   const Advice advice = AdviseOn(views);
-  const Place& between = PlaceCalled(advice, "between 00 and 01");
+  const Place between = PlaceCalled(advice, "between 00 and 01");
   EXPECT_NEAR(between.seen_share, 1, 1e-12);
   EXPECT_NEAR(between.gap_deg, std::atan(1 / kWallZ) * 180 / std::numbers::pi, 0.2);
   EXPECT_FALSE(between.poor);
   // A whole step beyond the last camera half a step's width of the wall was seen by nobody.
-  const Place& beyond = PlaceCalled(advice, "beyond 01, away from 00");
+  const Place beyond = PlaceCalled(advice, "beyond 01, away from 00");
   EXPECT_NEAR(beyond.unseen_share, 1 / (kWallZ * 0.96), 0.015);
   EXPECT_NEAR(beyond.cam_from_world.TargetOriginInSource().x(), 3, 1e-12);
 }

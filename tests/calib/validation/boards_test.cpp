@@ -10,7 +10,7 @@ namespace {
 using namespace testing;
 using ::testing::HasSubstr;
 
-const Check& TestOf(const BoardValidation& report, const std::string& name) {
+Check TestOf(const BoardValidation& report, const std::string& name) {
   static const Check kNone;
   for (const Check& test : report.tests) {
     if (test.name == name) return test;
@@ -82,7 +82,7 @@ TEST(ValidateBoards, TestViewsDoNotExcuseWhatTheKeptOnesContradict) {
   const double sigma = std::sqrt(solution.covariance(0, 0));
   calibration.cameras[0].camera.params[0] += 2 * sigma;
   const BoardValidation report = ValidateBoards(calibration, unseen, {});
-  const Check& lens = TestOf(report, "lens_difference_sigmas");
+  const Check lens = TestOf(report, "lens_difference_sigmas");
   EXPECT_FALSE(lens.passed) << lens.reason;
   EXPECT_EQ(lens.limit, BoardLimits{}.max_self_difference_sigmas);
   EXPECT_THAT(lens.reason, HasSubstr("fresh solve"));
