@@ -24,10 +24,12 @@ namespace fs = std::filesystem;
 const Board kPhotoBoard{Board::Kind::kChessboard, 9, 6, 1, 0, "", false};
 constexpr int kWidth = 1280, kHeight = 720;
 
-const std::vector<BoardView>& Views(const fs::path& folder) {
+fs::path Photos() { return dtr::testing::DataFolder() / "field/lens_auto_fisheye/photos"; }
+
+const std::vector<BoardView>& Views() {
   static const std::vector<BoardView> kViews = [&] {
     std::vector<fs::path> files;
-    for (const auto& entry : fs::directory_iterator(folder)) files.push_back(entry.path());
+    for (const auto& entry : fs::directory_iterator(Photos())) files.push_back(entry.path());
     std::sort(files.begin(), files.end());
     std::vector<Detection> found(files.size());
     ParallelFor(0, static_cast<int>(files.size()), 0, [&](int i) {
@@ -47,8 +49,6 @@ const std::vector<BoardView>& Views(const fs::path& folder) {
   }();
   return kViews;
 }
-
-fs::path Photos() { return dtr::testing::DataFolder() / "field/lens_auto_fisheye/photos"; }
 
 // Every corner counted, as OpenCV does: OpenCvParity tests that it is the same camera.
 BoardSolution Solved(const std::vector<BoardView>& views, BoardModel model) {
@@ -89,7 +89,7 @@ double RmsOf(const std::vector<double>& lengths) {
 
 TEST(ModelChoiceOfPhotos, AnOrdinaryLensIsWithinAPixelOfOpenCvsOverTheWholeImage) {
   DTR_REQUIRE_DATA(Photos());
-  const auto& views = Views(Photos());
+  const auto& views = Views();
   ASSERT_GE(views.size(), 15u);
   ChoiceOptions options;
   options.folds = 5;
@@ -106,7 +106,7 @@ TEST(ModelChoiceOfPhotos, AnOrdinaryLensIsWithinAPixelOfOpenCvsOverTheWholeImage
 
 TEST(ModelChoiceOfPhotos, AModelThatBendsBeyondTheCornersSeenStatesHowFarOthersAreFromIt) {
   DTR_REQUIRE_DATA(Photos());
-  const auto& views = Views(Photos());
+  const auto& views = Views();
   const std::vector<std::vector<int>> none(views.size());
   const auto others = OtherModels(kPhotoBoard, BoardModel::kFisheye, kWidth, kHeight, views, none);
   const auto brown4 = std::find_if(others.begin(), others.end(), [](const OtherModel& other) {
