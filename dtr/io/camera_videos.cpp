@@ -89,34 +89,21 @@ std::vector<std::string> EncoderCommand(const VideoQuality& quality, const Pinho
                                    "-video_size",
                                    fmt::format("{}x{}", camera.width_px(), camera.height_px()),
                                    "-framerate",
-                                   "24",
-                                   "-i",
-                                   "frames.raw",
-                                   "-map_metadata",
-                                   "-1",
-                                   "-fflags",
-                                   "+bitexact",
-                                   "-threads",
-                                   "1",
-                                   "-preset",
-                                   "slow"};
+                                   "24"};
+  // Of the input, too: FFmpeg from 7.1 on converts colours that are not stated.
+  const std::vector<std::string> colours{
+      "-color_range",     "pc",    "-colorspace", "bt709",
+      "-color_primaries", "bt709", "-color_trc",  "iec61966-2-1"};
+  if (!quality.lossless) command.insert(command.end(), colours.begin(), colours.end());
+  command.insert(command.end(), {"-i", "frames.raw", "-map_metadata", "-1", "-fflags", "+bitexact",
+                                 "-threads", "1", "-preset", "slow"});
   const std::vector<std::string> coding =
-      quality.lossless ? std::vector<std::string>{"-c:v", "libx264rgb", "-qp", "0"}
-                       : std::vector<std::string>{"-c:v",
-                                                  "libx264",
-                                                  "-crf",
-                                                  std::to_string(quality.crf),
-                                                  "-tune",
-                                                  "psnr",
-                                                  "-color_range",
-                                                  "pc",
-                                                  "-colorspace",
-                                                  "bt709",
-                                                  "-color_primaries",
-                                                  "bt709",
-                                                  "-color_trc",
-                                                  "iec61966-2-1"};
+      quality.lossless
+          ? std::vector<std::string>{"-c:v", "libx264rgb", "-qp", "0"}
+          : std::vector<std::string>{"-c:v",  "libx264", "-crf", std::to_string(quality.crf),
+                                     "-tune", "psnr"};
   command.insert(command.end(), coding.begin(), coding.end());
+  if (!quality.lossless) command.insert(command.end(), colours.begin(), colours.end());
   command.insert(command.end(), {"-pix_fmt", format, "video.mp4"});
   return command;
 }
