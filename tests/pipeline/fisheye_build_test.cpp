@@ -1,5 +1,6 @@
 // Cameras of fisheye photos from the photos alone, where the user says that they are: against the
 // exact truth.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,8 +9,10 @@
 #include "calib/similarity.h"
 #include "capture/ingest.h"
 #include "datasets/make.h"
+#include "dtr/base/error.h"
 #include "dtr/io/formats/cameras_json.h"
 #include "pipeline/calibrate.h"
+#include "tests/support/message_of.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::pipeline {
@@ -17,7 +20,7 @@ namespace {
 
 using dtr::testing::TemporaryFolder;
 
-// Photos of a fisheye of 160 degrees across, with a lens that is not quite equidistant.
+// Photos of a fisheye of 173 degrees across, with a lens that is not quite equidistant.
 class Fisheye : public ::testing::Test {
  protected:
   static constexpr double kK1 = -0.03, kK2 = 0.004;
@@ -26,10 +29,10 @@ class Fisheye : public ::testing::Test {
     folder_ = new TemporaryFolder;
     datasets::DatasetSpec spec;
     spec.scene = "courtyard";
-    spec.views = 10;
-    spec.width_px = 600;
-    spec.height_px = 450;
-    spec.focal_35mm = 12.5;
+    spec.views = 12;
+    spec.width_px = 640;
+    spec.height_px = 480;
+    spec.focal_35mm = 12;
     spec.supersampling = 2;
     spec.fisheye = true;
     spec.k1 = kK1;
@@ -90,6 +93,11 @@ TEST_F(Fisheye, CamerasOfThePhotosAloneAreThoseOfTheTruth) {
     const calib::Similarity aligned = calib::AlignPoints(centres, exact_centres);
     EXPECT_LT(calib::AlignmentRms(aligned, centres, exact_centres), 0.005 * extent);
   }
+}
+
+TEST_F(Fisheye, TakenForAPerspectiveCameraItIsRejectedWithWhatToDo) {
+  EXPECT_THAT(dtr::testing::MessageOf<Error>([] { (void)Calibrated("RADIAL", true); }),
+              ::testing::HasSubstr("a fisheye? then `lens_model` RADIAL_FISHEYE"));
 }
 
 }  // namespace

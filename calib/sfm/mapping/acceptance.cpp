@@ -44,11 +44,13 @@ std::string WhyNotFocal(const MapEvidence& evidence) {
     if (!used[c]) continue;
     const calib::LensCamera& lens = evidence.cameras.lenses[c];
     const double f = lens.params[0], side = std::max(lens.width_px, lens.height_px);
-    const double least = calib::IsFisheye(lens.model) ? kMinFisheyeFocal : kMinFocal;
+    const bool fisheye = calib::IsFisheye(lens.model);
+    const double least = fisheye ? kMinFisheyeFocal : kMinFocal;
     if (!(f > least * side && f < kMaxFocal * side)) {
       return fmt::format(
-          "the focal length of camera {} became {:.0f} px, {:.2f} times the long side", c + 1, f,
-          f / side);
+          "the focal length of camera {} became {:.0f} px, {:.2f} times the long side{}", c + 1, f,
+          f / side,
+          f <= least * side && !fisheye ? " (a fisheye? then `lens_model` RADIAL_FISHEYE)" : "");
     }
     const double before = evidence.graph.cameras[c].params[0];
     const double change = std::max(f / before, before / f);
