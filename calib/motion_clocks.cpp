@@ -206,11 +206,12 @@ std::vector<PairShift> ShiftsOfPairs(const std::vector<MotionSeen>& cameras, int
   return shifts;
 }
 
-// Shifts of all cameras by the best pairs that join them; empty for a camera that none joins.
-std::vector<std::optional<double>> ByBestPairs(const std::vector<PairShift>& shifts,
-                                               size_t cameras) {
+// Shifts of all cameras by the best pairs that join them to the first; empty for one that none
+// joins.
+std::vector<std::optional<double>> ByBestPairs(const std::vector<PairShift>& shifts, size_t cameras,
+                                               size_t first) {
   std::vector<std::optional<double>> later(cameras);
-  later[0] = 0.0;
+  later[first] = 0.0;
   for (bool more = true; more;) {
     more = false;
     for (const PairShift& pair : shifts) {
@@ -227,10 +228,16 @@ std::vector<std::optional<double>> ByBestPairs(const std::vector<PairShift>& shi
   return later;
 }
 
-void RequireAllJoined(const std::vector<std::optional<double>>& later,
+void RequireAllJoined(const std::vector<PairShift>& shifts,
+                      const std::vector<std::optional<double>>& later,
                       const std::vector<MotionSeen>& cameras) {
+  const auto joined = [](const auto& list) {
+    return std::count_if(list.begin(), list.end(), [](const auto& at) { return at.has_value(); });
+  };
   for (size_t c = 0; c < later.size(); ++c) {
     if (later[c]) continue;
+    // Where more are joined to this one than to the first, that is the odd one.
+    if (joined(ByBestPairs(shifts, later.size(), c)) > joined(later)) c = 0;
     throw Error(fmt::format(
         "clocks: camera {}: expected motion that it and another camera see, and that does not "
         "repeat, found none; record something that moves in the middle of the scene, keep clocks "
@@ -277,8 +284,8 @@ void RequireMotion(const std::vector<MotionSeen>& cameras) {
 std::vector<MotionClock> FindMotionClocks(const std::vector<MotionSeen>& cameras, int threads) {
   RequireMotion(cameras);
   const std::vector<PairShift> shifts = ShiftsOfPairs(cameras, threads);
-  const auto by_best = ByBestPairs(shifts, cameras.size());
-  RequireAllJoined(by_best, cameras);
+  const auto by_best = ByBestPairs(shifts, cameras.size(), 0);
+  RequireAllJoined(shifts, by_best, cameras);
   std::vector<PairShift> agreeing;
   std::vector<int> contradicting(cameras.size());
   for (const PairShift& pair : shifts) {

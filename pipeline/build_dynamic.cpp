@@ -213,7 +213,8 @@ BuildReport BuildDynamicSet(const BuildOptions& asked, const DynamicOptions& dyn
   RecordedNotes progress(listener);
   log.Begin("capture");
   Recording recording(options.photos,
-                      {std::max(1, options.video.every), dynamic.from, dynamic.to, dynamic.fps},
+                      {std::max(1, options.video.every), dynamic.from, dynamic.to, dynamic.fps,
+                       dynamic.free_clocks},
                       progress);
   const std::vector<bool> held_out = ChooseHeldOut(options.holdout, recording.cameras());
   if (fixed.rig) RequireRigCameras(*fixed.rig, recording, progress);

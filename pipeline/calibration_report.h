@@ -76,7 +76,7 @@ struct CalibrationReport {
   std::optional<CameraSharing> camera_sharing;
   std::optional<BundleAdjustment> bundle_adjustment;
   std::optional<ExifFocal> exif_focal;
-  /// Whether cameras that were given fit the photos, where they came without points.
+  /// Whether cameras that were given fit the photos.
   std::optional<calib::ConventionReport> given_cameras;
 };
 

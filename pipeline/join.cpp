@@ -26,6 +26,7 @@ struct Step {
   fs::path folder;
   DtrSet still;
   double time_s = 0;
+  bool is_of_dynamic = false;  // whose ids begin with the time step
 };
 
 /// What decides the result: the sets' descriptions, which hold the hashes of their files.
@@ -84,7 +85,7 @@ std::vector<Step> StepsOf(const std::vector<fs::path>& sets, double frames_per_s
     const double period_s = set.frames.size() > 1 ? clock.period_s() : 1 / frames_per_second;
     std::vector<DtrSet> stills = SplitFrames(std::move(set));
     for (size_t i = 0; i < stills.size(); ++i) {
-      steps.push_back({folder, std::move(stills[i]), next_s + clock.StartOf(i)});
+      steps.push_back({folder, std::move(stills[i]), next_s + clock.StartOf(i), stills.size() > 1});
     }
     next_s += period_s;
   }
@@ -98,9 +99,9 @@ std::string IdOfCamera(const std::string& id) {
   return timed && id[digits] == '_' && digits + 1 < id.size() ? id.substr(digits + 1) : id;
 }
 
-View Joined(const View& view, size_t step) {
+View Joined(const View& view, size_t index, bool is_of_dynamic) {
   View joined = view;
-  joined.id = fmt::format("t{:04}_{}", step, IdOfCamera(view.id));
+  joined.id = fmt::format("t{:04}_{}", index, is_of_dynamic ? IdOfCamera(view.id) : view.id);
   for (auto* file : {&joined.image_file, &joined.mask_file, &joined.depth_file,
                      &joined.completed_file, &joined.sigma_file, &joined.mesh_file,
                      &joined.depth_base, &joined.completed_base, &joined.sigma_base}) {
@@ -117,7 +118,7 @@ Frame WriteViews(const Step& step, size_t index, const io::LoadOptions& load, Le
   frame.time_s = step.time_s;
   for (const View& view : step.still.frames.front().views) {
     progress.ThrowIfInterrupted();
-    View joined = Joined(view, index);
+    View joined = Joined(view, index, step.is_of_dynamic);
     if (!writer.RestoreView(joined)) {  // by a run that was interrupted
       View source = view;
       source.mesh_file.reset();
@@ -157,7 +158,7 @@ void WriteMeshes(const std::vector<Step>& steps, io::LoadOptions load, io::SetWr
 
 size_t JoinSets(const std::vector<fs::path>& sets, const fs::path& target,
                 const JoinOptions& options, Progress& progress) {
-  if (sets.size() < 2) throw UsageError("join: expected two sets or more, one for each time step");
+  if (sets.size() < 2) throw UsageError("join: expected two sets or more, in order of time");
   if (options.video) io::RequireVideoEncoder();
   std::vector<Step> steps = StepsOf(sets, options.frames_per_second);
   const nlohmann::json fingerprint = FingerprintOf(sets, options);

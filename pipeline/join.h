@@ -14,7 +14,8 @@ struct JoinOptions {
   /// Time steps of sets that have one each. Dynamic sets keep their own times, one set after the
   /// other, as far apart as their time steps are on average.
   double frames_per_second = 24;
-  /// Images of source cameras as videos; empty: every one a PNG.
+  /// Images of source cameras as videos; empty: every one a PNG. Those of sets that have videos
+  /// are decoded, and coded again.
   std::optional<io::VideoQuality> video;
   bool force = false;
   int threads = 0;

@@ -30,8 +30,8 @@ constexpr std::array kRisingFreedom{LensFreedom::kNoPrincipalPoint, LensFreedom:
                                     LensFreedom::kTangentialPerImage};
 
 constexpr size_t kNoneConverged = ~size_t{0}, kNoScale = kNoneConverged - 1;
-constexpr double kSurelySigmas =
-    5;  // errors of real observations go together: predicted ones are small
+// Errors of features that lie near each other go together, so predicted ones are still small.
+constexpr double kSurelySigmas = 5;
 
 bool HasPriors(const RefineOptions& options) {
   return !options.positions.empty() || !options.distances.empty();

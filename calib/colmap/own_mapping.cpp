@@ -64,9 +64,17 @@ Undetermined UndeterminedOf(Workspace& workspace, const calib::SfmModel& model,
 }
 
 // Drops COLMAP's models unless the matches agree with the largest. Returns why not.
-std::string DropContradicted(Workspace& workspace, std::vector<calib::SfmModel>& colmaps) {
+std::string DropContradicted(Workspace& workspace, const std::vector<CameraGroup>& groups,
+                             std::vector<calib::SfmModel>& colmaps) {
   if (colmaps.empty()) return "";
   sfm::ViewGraph graph = ReadViewGraph(workspace.database());
+  // What EXIF says contradicts nothing; what pairs voted for does.
+  const GroupLenses exif = LensesOf(workspace, groups);
+  for (size_t i = 0; i < graph.cameras.size() && i < exif.lenses.size(); ++i) {
+    const bool is_exifs =
+        exif.focal_is_known[i] && graph.cameras[i].params[0] == exif.lenses[i].params[0];
+    if (is_exifs) graph.focal_is_known[i] = 0;
+  }
   for (sfm::GraphImage& image : graph.images) image.name = workspace.NameOfAlias(image.name);
   std::string why = sfm::WhyContradicted(graph, colmaps.front(), workspace.threads());
   if (!why.empty()) colmaps.clear();
@@ -239,7 +247,7 @@ std::vector<calib::SfmModel> MapOrFallBack(
     colmaps = AskColmap(workspace, passes, by_colmap);
   }
   if (colmaps.empty() && !passes) return {};
-  if (const std::string against = DropContradicted(workspace, colmaps); !against.empty()) {
+  if (const std::string against = DropContradicted(workspace, groups, colmaps); !against.empty()) {
     if (!passes) {
       ThrowRejected(why + ", and of COLMAP's model that " + against,
                     "photos must overlap by half, from several places");

@@ -28,7 +28,7 @@ namespace {
 
 // Where EXIF says nothing, of the long side: a moderate wide angle, as COLMAP assumes.
 constexpr double kGuessedFocal = 1.2;
-constexpr double kGuessedFisheyeFocal = 0.4;  // 150 degrees on the long side
+constexpr double kGuessedFisheyeFocal = 0.4;  // 143 degrees on the long side
 // Of the memory, for descriptors; matches and what they are copied to take the rest.
 constexpr double kDescriptorShare = 0.5;
 

@@ -102,6 +102,13 @@ TEST(MotionClocks, ACameraWithoutMotionIsNamed) {
   EXPECT_THAT(RejectionOf(cameras), AllOf(HasSubstr("camera c"), HasSubstr("timestamps.csv")));
 }
 
+TEST(MotionClocks, TheFirstCameraWithoutMotionIsNamedToo) {
+  const std::vector<MotionSeen> cameras{Camera("a", 0, 0, 40, Still),
+                                        Camera("b", 0.4, 2, 40, Wandering),
+                                        Camera("c", 0.8, 1, 40, Wandering)};
+  EXPECT_THAT(RejectionOf(cameras), HasSubstr("camera a"));
+}
+
 TEST(MotionClocks, MotionThatRepeatsDecidesNothing) {
   const std::vector<MotionSeen> cameras{Camera("a", 0, 0, 64, Turning),
                                         Camera("b", 0.4, 3, 64, Turning)};

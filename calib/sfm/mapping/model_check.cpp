@@ -69,7 +69,7 @@ std::string WhyNotFocalOfPairs(const ViewGraph& graph, const MapCameras& cameras
     return fmt::format(
         "the focal length of camera {} became {:.0f} px, where pairs of its photos agree on "
         "{:.0f} px: photos of several cameras or zoom settings need intrinsics of their own "
-        "(--camera-per folder or photo)",
+        "(`camera_per` folder or photo)",
         c + 1, f, known);
   }
   return "";

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
+#include <optional>
 #include <set>
 
 #include "capture/video/frames.h"
@@ -33,8 +35,11 @@ ShotsByTime ShotsOf(const RigLayout& layout) {
   return shots;
 }
 
-double StepsPerSecond(const RigLayout& layout, const StepChoice& choice) {
+// `slowest`: of videos of different rates.
+double StepsPerSecond(const RigLayout& layout, const StepChoice& choice,
+                      const std::optional<double>& slowest) {
   if (choice.fps) return *choice.fps;
+  if (slowest) return *slowest;
   const RigShot& first = layout.shots.front();
   if (first.number < 0) return kPhotosPerSecond;
   const double rate = capture::VideoReader(first.file).frames_per_second();
@@ -42,20 +47,21 @@ double StepsPerSecond(const RigLayout& layout, const StepChoice& choice) {
 }
 
 // Frames of equal number are of one time only where all videos run at one rate. Others keep the
-// frames nearest in time to those of the slowest, under its numbers.
-void ResampleToOneRate(const fs::path& folder, RigLayout& layout, Progress& progress) {
+// frames nearest in time to those of the slowest, under its numbers; its rate is returned.
+std::optional<double> ResampleToOneRate(const fs::path& folder, RigLayout& layout,
+                                        Progress& progress) {
   constexpr double kSameRate = 1e-6;  // relative
-  if (layout.shots.front().number < 0 || fs::exists(folder / "timestamps.csv")) return;
+  if (layout.shots.front().number < 0 || fs::exists(folder / "timestamps.csv")) return {};
   std::map<fs::path, double> rates;
   for (const RigShot& shot : layout.shots) rates.emplace(shot.file, 0);
   for (auto& [file, rate] : rates) {
     rate = capture::VideoReader(file).frames_per_second();
-    if (!(rate > 0)) return;  // not stated
+    if (!(rate > 0)) return {};  // not stated
   }
   const auto slower = [](const auto& a, const auto& b) { return a.second < b.second; };
   const auto [slowest, rate] = *std::min_element(rates.begin(), rates.end(), slower);
   const auto [fastest, most] = *std::max_element(rates.begin(), rates.end(), slower);
-  if (most - rate <= kSameRate * rate) return;
+  if (most - rate <= kSameRate * rate) return {};
   progress.Note(fmt::format(
       "{}: {:.3f} frames per second, {}: {:.3f}; of faster videos the frames nearest in time are "
       "taken, at most {:.1f} ms off",
@@ -84,17 +90,20 @@ void ResampleToOneRate(const fs::path& folder, RigLayout& layout, Progress& prog
   resampled.frames.clear();
   for (const int number : numbers) resampled.frames.push_back(std::to_string(number));
   layout = std::move(resampled);
+  return rate;
 }
 
-// The time steps that all cameras have, each camera's image `later` frames after its number.
+// Those of `frames` (indices) that all cameras have, each camera's image `later` frames after its
+// number.
 std::vector<RecordedStep> WholeSteps(const fs::path& folder, const RigLayout& layout,
+                                     const std::vector<size_t>& frames,
                                      const std::vector<int>& later, double fps,
                                      Progress& progress) {
   const ShotsByTime shots = ShotsOf(layout);
   const std::vector<size_t> times = FrameTimes(layout.frames);
   std::vector<RecordedStep> steps;
   std::string first_missing;
-  for (size_t i = 0; i < layout.frames.size(); ++i) {
+  for (const size_t i : frames) {
     RecordedStep step{layout.frames[i], static_cast<double>(times[i]) / fps, {}};
     for (size_t c = 0; c < layout.cameras.size(); ++c) {
       const auto then = shots.find(times[i] + static_cast<size_t>(later[c]));  // wraps below 0
@@ -112,15 +121,16 @@ std::vector<RecordedStep> WholeSteps(const fs::path& folder, const RigLayout& la
         "one time step have equal names or numbers, or rows of one sync_index in timestamps.csv",
         folder.string(), layout.cameras.size()));
   }
-  if (steps.size() < layout.frames.size()) {
+  if (steps.size() < frames.size()) {
     progress.Note(
         fmt::format("{} of {} time steps left out: not all cameras have an image, first {}",
-                    layout.frames.size() - steps.size(), layout.frames.size(), first_missing));
+                    frames.size() - steps.size(), frames.size(), first_missing));
   }
   return steps;
 }
 
-std::vector<RecordedStep> Chosen(std::vector<RecordedStep> steps, const StepChoice& choice) {
+template <typename Step>
+std::vector<Step> Chosen(std::vector<Step> steps, const StepChoice& choice) {
   const int count = static_cast<int>(steps.size());
   const int last = choice.to.value_or(count - 1);
   if (choice.every < 1 || choice.from < 0 || choice.from > last || last >= count) {
@@ -129,7 +139,7 @@ std::vector<RecordedStep> Chosen(std::vector<RecordedStep> steps, const StepChoi
         "every >= 1",
         choice.from, last, choice.every, count - 1));
   }
-  std::vector<RecordedStep> chosen;
+  std::vector<Step> chosen;
   for (int i = choice.from; i <= last; i += choice.every) {
     chosen.push_back(std::move(steps[static_cast<size_t>(i)]));
   }
@@ -172,19 +182,34 @@ Recording::Recording(const fs::path& folder, const StepChoice& choice, Progress&
   for (const auto& left_out : layout_.left_out) {
     progress.Note(left_out.name + ": " + left_out.reason);
   }
-  ResampleToOneRate(folder, layout_, progress);
-  steps_per_second_ = StepsPerSecond(layout_, choice);
-  Shift(std::vector<int>(layout_.cameras.size()), progress);
+  const auto slowest = ResampleToOneRate(folder, layout_, progress);
+  steps_per_second_ = StepsPerSecond(layout_, choice, slowest);
+  const std::vector<int> as_numbered(layout_.cameras.size());
+  std::vector<size_t> frames(layout_.frames.size());
+  std::iota(frames.begin(), frames.end(), size_t{0});
+  if (!choice.free_clocks) {
+    steps_ = Chosen(WholeSteps(folder_, layout_, frames, as_numbered, steps_per_second_, progress),
+                    choice);
+    return;
+  }
+  const ShotsByTime shots = ShotsOf(layout_);
+  const std::vector<size_t> times = FrameTimes(layout_.frames);
+  std::erase_if(frames, [&](size_t i) { return !shots.at(times[i]).contains(0); });
+  chosen_frames_ = Chosen(std::move(frames), choice);
+  Shift(as_numbered, progress);
 }
 
 void Recording::Shift(const std::vector<int>& later, Progress& progress) {
-  steps_ = Chosen(WholeSteps(folder_, layout_, later, steps_per_second_, progress), choice_);
+  steps_ = WholeSteps(folder_, layout_, chosen_frames_, later, steps_per_second_, progress);
 }
 
 std::vector<fs::path> Recording::Files() const {
   std::set<fs::path> files;
   for (const RecordedStep& step : steps_) {
     for (const size_t shot : step.shots) files.insert(layout_.shots[shot].file);
+  }
+  if (choice_.free_clocks) {
+    for (const RigShot& shot : layout_.shots) files.insert(shot.file);
   }
   if (const fs::path table = folder_ / "timestamps.csv"; fs::exists(table)) files.insert(table);
   return {files.begin(), files.end()};
@@ -195,10 +220,11 @@ void Recording::ForEachFrame(size_t camera, size_t most,
                              const Progress& progress) const {
   const ShotsByTime shots = ShotsOf(layout_);
   size_t from = 0;
-  if (shots.rbegin()->first >= most) {
+  if (const size_t last = shots.rbegin()->first; last >= most) {
     const std::string& first = layout_.shots[steps_.front().shots.front()].frame;
     const auto at = std::find(layout_.frames.begin(), layout_.frames.end(), first);
     from = FrameTimes(layout_.frames)[static_cast<size_t>(at - layout_.frames.begin())];
+    from = std::min(from, last + 1 - most);
   }
   std::map<size_t, const RigShot*> wanted;
   for (auto then = shots.lower_bound(from); then != shots.end(); ++then) {

@@ -19,6 +19,8 @@ struct StepChoice {
   int from = 0;               ///< numbers of time steps that all cameras have, from 0
   std::optional<int> to;      ///< the last one; empty: all
   std::optional<double> fps;  ///< time steps per second; empty: as the videos say, of photos 24
+  /// Cameras began when they liked (Shift): the numbers above count frames of the first camera.
+  bool free_clocks = false;
 };
 
 /// One image of every camera.
@@ -37,18 +39,18 @@ class Recording {
   /// has an image of every camera.
   Recording(const std::filesystem::path& folder, const StepChoice& choice, Progress& progress);
 
-  /// Takes time steps again, each camera's image `later` frames after the one of equal number; one
-  /// number per camera. Choice, notes and errors as above.
+  /// Of free clocks: takes the chosen time steps again, each camera's image `later` frames after
+  /// the one of equal number; one number per camera. Notes and errors as above.
   void Shift(const std::vector<int>& later, Progress& progress);
 
   const std::vector<std::string>& cameras() const { return layout_.cameras; }
   const std::vector<RecordedStep>& steps() const { return steps_; }
-  /// Everything that is read, for a fingerprint: files, each once.
+  /// Everything that is read, for a fingerprint: files, each once. With free clocks all.
   std::vector<std::filesystem::path> Files() const;
 
   /// Hands out a camera's images of at most `most` consecutive frames, time steps or not, in rising
-  /// order: all, or where there are more those from the first time step on. `frame` counts from the
-  /// first of any camera, with gaps where one is missing.
+  /// order: all, or where there are more those from the first time step on (the last ones where
+  /// fewer follow). `frame` counts from the first of any camera, with gaps where one is missing.
   /// Throws as ForEach.
   void ForEachFrame(size_t camera, size_t most,
                     const std::function<void(size_t frame, const ImageRgb8& image)>& take,
@@ -66,6 +68,7 @@ class Recording {
   StepChoice choice_;
   RigLayout layout_;
   double steps_per_second_ = 0;
+  std::vector<size_t> chosen_frames_;  ///< of layout_.frames, with free clocks
   std::vector<RecordedStep> steps_;
 };
 

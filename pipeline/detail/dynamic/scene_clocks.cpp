@@ -42,7 +42,7 @@ Differences DifferencesOf(const ImageRgb8& before, const ImageRgb8& now) {
   return differences;
 }
 
-// Mean over each cell of what is above noise. A contrast above 40 levels counts as 40: a motion is
+// Sum over each cell of what is above noise. A contrast above 40 levels counts as 40: a motion is
 // no larger for being that of something brighter.
 Grid<float> MotionCells(const ImageRgb8& before, const ImageRgb8& now) {
   constexpr int kMostLevels = 40;

@@ -9,9 +9,10 @@
 
 namespace dtr::pipeline {
 
-/// How many frames later each camera's images are, by the first 1200 frames of the recording
-/// (calib::FindMotionClocks). All in the recording's order of cameras, in one world. Throws Error
-/// as that, where images are not of their camera's size, and as Recording::ForEachFrame.
+/// How many frames later each camera's images are, by the frames of the recording, of a longer one
+/// 1200 from the first time step on (calib::FindMotionClocks). All in the recording's order of
+/// cameras, in one world. Throws Error as that, where images are not of their camera's size, and as
+/// Recording::ForEachFrame.
 std::vector<calib::MotionClock> FindClocks(const Recording& recording,
                                            const std::vector<calib::LensCamera>& lenses,
                                            const std::vector<Pose>& cam_from_world, int threads,

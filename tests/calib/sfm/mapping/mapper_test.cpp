@@ -289,7 +289,7 @@ TEST(WhyContradicted, AModelOfTheMatchesPassesAndOneOfMixedUpPhotosDoesNot) {
   ViewGraph zoomed = seen.graph;
   zoomed.focal_is_known[0] = 1;
   zoomed.cameras[0].params[0] *= 2.2;
-  EXPECT_THAT(WhyContradicted(zoomed, model, 1), ::testing::HasSubstr("--camera-per"));
+  EXPECT_THAT(WhyContradicted(zoomed, model, 1), ::testing::HasSubstr("camera_per"));
   model.images[0].name = "another.jpg";
   EXPECT_THROW(WhyContradicted(seen.graph, model, 1), std::invalid_argument);
 }
