@@ -203,31 +203,15 @@ void WriteAvif(const TemporaryFolder& folder, const std::string& name, const Col
     }
   }
   WriteFileAtomically(folder / "flat.yuv", bytes);
-  std::vector<std::string> command{"ffmpeg",
-                                   "-y",
-                                   "-loglevel",
-                                   "error",
-                                   "-f",
-                                   "rawvideo",
-                                   "-pix_fmt",
-                                   "yuv444p10le",
-                                   "-s",
-                                   "64x64",
-                                   "-color_range",
-                                   "pc",
-                                   "-i",
-                                   "flat.yuv",
-                                   "-c:v",
-                                   "libaom-av1",
-                                   "-still-picture",
-                                   "1",
-                                   "-crf",
-                                   "0",
-                                   "-pix_fmt",
-                                   "yuv444p10le",
-                                   "-color_range",
-                                   "pc"};
-  command.insert(command.end(), tags.begin(), tags.end());
+  // Tags go to the input: of the output alone, FFmpeg 7 ignores some.
+  std::vector<std::string> command{"ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo"};
+  const auto add = [&command](const std::vector<std::string>& words) {
+    command.insert(command.end(), words.begin(), words.end());
+  };
+  add({"-pix_fmt", "yuv444p10le", "-s", "64x64", "-color_range", "pc"});
+  add(tags);
+  add({"-i", "flat.yuv", "-c:v", "libaom-av1", "-still-picture", "1", "-crf", "0"});
+  add({"-pix_fmt", "yuv444p10le"});
   command.push_back(name);
   ProcessOptions options;
   options.working_directory = folder.path();

@@ -236,6 +236,16 @@ TEST(VideoTruth, WhatWeWriteIsStatedAndReadBack) {
   ASSERT_TRUE(video.Next());
   ExpectColour(video.Picture(), {0.8, 64 / 255.0, 26 / 255.0}, 3.1, "our own");
   EXPECT_THAT(video.remarks(), IsEmpty());
+  ProcessOptions probe;
+  probe.log_file = folder / "probe.txt";
+  ASSERT_TRUE(
+      RunProcess({"ffprobe", "-v", "error", "-show_streams", (folder / "out.mp4").string()}, probe)
+          .Ok());
+  const std::string stated = ReadFile(folder / "probe.txt", 1 << 20);
+  for (const char* colours : {"color_range=tv", "color_space=bt709", "color_primaries=bt709",
+                              "color_transfer=iec61966-2-1"}) {
+    EXPECT_THAT(stated, HasSubstr(colours));
+  }
 }
 
 TEST(VideoTruth, HdrReferenceWhiteComesNearWhite) {
