@@ -111,8 +111,10 @@ void RequireExrOfColours(const ImageSpec& spec, const fs::path& file) {
   for (size_t i = 0; i < 3 && i < spec.channelnames.size(); ++i) {
     first += last_part(spec.channelnames[i]);
   }
-  if (first == "YRYBY" || first == "YBYRY" || first == "BYRYY" || first == "BYYRY" ||
-      first == "RYBYY" || first == "RYYBY") {
+  // OpenImageIO 2.5 gives them as R, G and B, and says so.
+  if (spec.get_int_attribute("openexr:luminancechroma") != 0 || first == "YRYBY" ||
+      first == "YBYRY" || first == "BYRYY" || first == "BYYRY" || first == "RYBYY" ||
+      first == "RYYBY") {
     throw Error(
         fmt::format("{}: a luminance-chroma EXR is not supported; write it as RGB", file.string()));
   }
