@@ -58,6 +58,20 @@ BoardSolution Solved(const std::vector<BoardView>& views, BoardModel model) {
   return SolveBoard(kPhotoBoard, views, kWidth, kHeight, model, options);
 }
 
+// Without the corners that `solution` calls outliers: with OpenCV 4.10 some of these are wrong.
+std::vector<BoardView> WithoutOutliers(std::vector<BoardView> views,
+                                       const BoardSolution& solution) {
+  for (const SolvedView& solved : solution.views) {
+    for (BoardView& view : views) {
+      if (view.name != solved.name) continue;
+      std::erase_if(view.corners, [&](const BoardCorner& corner) {
+        return std::binary_search(solved.outliers.begin(), solved.outliers.end(), corner.id);
+      });
+    }
+  }
+  return views;
+}
+
 // Distance over the whole image after the best rotation about the camera's centre.
 std::vector<double> Differences(const LensCamera& a, const LensCamera& b) {
   std::vector<Eigen::Vector3d> rays_a, rays_b;
@@ -100,8 +114,9 @@ TEST(ModelChoiceOfPhotos, AnOrdinaryLensIsWithinAPixelOfOpenCvsOverTheWholeImage
     if (score.model != BoardModel::kFisheye) continue;
     EXPECT_THAT(score.refused, ::testing::HasSubstr("bends between the outermost corner seen"));
   }
-  EXPECT_LT(RmsOf(Differences(Solved(views, BoardModel::kBrown4).camera, chosen.solution->camera)),
-            1);
+  const BoardSolution of_opencv =
+      Solved(WithoutOutliers(views, *chosen.solution), BoardModel::kBrown4);
+  EXPECT_LT(RmsOf(Differences(of_opencv.camera, chosen.solution->camera)), 1);
 }
 
 TEST(ModelChoiceOfPhotos, AModelThatBendsBeyondTheCornersSeenStatesHowFarOthersAreFromIt) {
