@@ -80,6 +80,9 @@ struct UserInterface::Callbacks {
   }
 
   static void Cursor(GLFWwindow* window, double x, double y) {
+#if IMGUI_VERSION_NUM >= 18700
+    ImGui_ImplGlfw_CursorPosCallback(window, x, y);  // earlier versions ask for it in every frame
+#endif
     UserInterface& self = Of(window);
     self.any_input_ = true;
     self.cursor_px_ = self.ToImage(x, y);
