@@ -129,7 +129,6 @@ TEST_F(Advice, OfATransformsJsonLeadsToTheGoal) {
   const std::string contradicts =
       Transforms("a/transforms.json", {{"is_fisheye", true}, {"camera_model", "OPENCV"}});
   const std::string rational = Transforms("b/transforms.json", {{"k4", 0.001}});
-  const std::string bent = Transforms("c/transforms.json", {{"k1", 0.001}});
   const std::string straight = Transforms("d/transforms.json", {});
   const std::vector<std::string> depth = {"--depth", Depth()};
   const std::string frames = In("frames");
@@ -150,11 +149,6 @@ TEST_F(Advice, OfATransformsJsonLeadsToTheGoal) {
          Transforms("b/transforms.json", {{"k4", 0.001}, {"camera_model", "FULL_OPENCV"}});
        },
        Import(rational, Photos(), depth)},
-      {kFailed,
-       "take its k1 and the like out of the file for a view as if undistorted",
-       render("--path", bent),
-       {},
-       render("--path", straight)},
       {kWrongUsage, "give --path for several", render("--camera", straight),
        [&] { fs::remove_all(frames); }, render("--path", straight)},
   });
