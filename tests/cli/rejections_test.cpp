@@ -71,7 +71,7 @@ TEST_F(Rejections, ASetOfOneViewServesNothingThatComparesViews) {
        "pruning: expected at least 2 source views to look between, found 1",
        {"prune", one, "--renderer", "cpu", "-o", In("pruned.dtr")}},
       {kWrongUsage,
-       "join: expected two sets or more, one for each time step",
+       "join: expected two sets or more, in order of time",
        {"join", one, "-o", In("moving.dtr")}},
       {kFailed,
        ": unit: expected metre as in",

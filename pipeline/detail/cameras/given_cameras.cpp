@@ -130,6 +130,14 @@ bool AreDoubtful(const calib::ConventionReport& report) {
   return !report.tested() || report.given_px > report.limit_px;
 }
 
+// What a full disk left undone says nothing of photos or cameras: the run must end, so that the
+// same command does it once there is room.
+bool IsOfFullDisk(const Error& error) {
+  const std::string what = error.what();
+  return what.find("No space left") != std::string::npos ||
+         what.find("disk is full") != std::string::npos;
+}
+
 }  // namespace
 
 TriangulatedCameras TriangulateAndTest(const GivenPhotos& given, Progress& progress) {
@@ -204,6 +212,7 @@ calib::ConventionReport TestWithPoints(const calib::SfmModel& model, const Given
     } catch (const UsageError&) {
       throw;
     } catch (const Error& error) {
+      if (IsOfFullDisk(error)) throw;
       // Photos without common features say nothing of their cameras.
       progress.Note(fmt::format("{}: its cameras are not tested with features of the photos: {}",
                                 given.file, error.what()));
