@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "calib/lens_map.h"
+#include "calib/models/fisheye.h"
 #include "calib/undistort.h"
 #include "dtr/base/error.h"
 
@@ -23,13 +24,22 @@ const SfmImage& ImageNamed(const SfmModel& model, const std::string& name) {
   return *image;
 }
 
+// Far from the axis of a fisheye a pixel of the pinhole view is many of the photo, in which the
+// feature was measured; beyond the view's edge by any factor.
+bool IsSeen(const Eigen::Vector2d& pixel, const LensCamera& lens, const PinholeCamera& view) {
+  return !IsFisheye(lens.model) || (pixel.x() >= 0 && pixel.y() >= 0 &&
+                                    pixel.x() <= view.width_px() && pixel.y() <= view.height_px());
+}
+
 // Observations of one view, by point id, the first feature of each.
 std::map<std::uint64_t, Eigen::Vector2d> ObservationsOf(const SfmImage& image, const LensMap& lens,
+                                                        const LensCamera& camera,
                                                         const PinholeCamera& undistorted) {
   std::map<std::uint64_t, Eigen::Vector2d> pixels;
   for (const SfmFeature& feature : image.features) {
     if (feature.point_id == SfmFeature::kNoPoint || pixels.contains(feature.point_id)) continue;
-    if (const auto pixel = UndistortedPixel(lens, undistorted, feature.pixel)) {
+    const auto pixel = UndistortedPixel(lens, undistorted, feature.pixel);
+    if (pixel && IsSeen(*pixel, camera, undistorted)) {
       pixels.emplace(feature.point_id, *pixel);
     }
   }
@@ -54,7 +64,8 @@ SparseScene ToSparseScene(const SfmModel& model, std::span<const std::string> vi
     }
     const SfmImage& image = ImageNamed(model, view_names[view]);
     const auto lens = lenses.try_emplace(image.camera_id, model.cameras.at(image.camera_id)).first;
-    seen.push_back(ObservationsOf(image, lens->second, undistorted[view]));
+    seen.push_back(
+        ObservationsOf(image, lens->second, model.cameras.at(image.camera_id), undistorted[view]));
     for (const auto& [id, pixel] : seen.back()) ++views_of_point[id];
   }
   SparseScene scene;

@@ -16,8 +16,9 @@ namespace dtr::calib {
 /// What only other images saw does not get in: points that fewer than two of the listed views see
 /// are dropped, so that a list of the source views keeps held-out photos out of everything built
 /// from points. Observations without a place on the undistorted grid's plane are dropped before
-/// that count; those off the image stay. Of two features of a view on one point the first stays.
-/// Points keep the order of their ids; observations are sorted by (view, point).
+/// that count, and of fisheyes those off the image, whose errors the undistorted grid makes larger
+/// by any factor; of other lenses those stay. Of two features of a view on one point the first
+/// stays. Points keep the order of their ids; observations are sorted by (view, point).
 ///
 /// `world_origin` is subtracted from the points, as it is from the views' poses (DtrSet).
 /// Throws std::invalid_argument when the numbers of names and cameras differ, Error when a name is

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "calib/similarity.h"
+#include "calib/sparse_from_sfm.h"
 #include "capture/ingest.h"
 #include "datasets/make.h"
 #include "dtr/base/error.h"
@@ -82,6 +83,16 @@ TEST_F(Fisheye, CamerasOfThePhotosAloneAreThoseOfTheTruth) {
       EXPECT_NEAR(lens.PixelFromCam(ray)->x() - lens.Pinhole().cx_px(),
                   exact.PixelFromCam(ray)->x() - pinhole.cx_px(), 1.5)
           << degrees;
+    }
+    std::vector<std::string> names;
+    for (const calib::SfmImage& image : found.images) names.push_back(image.name);
+    const PinholeCamera view = lens.Pinhole();
+    const SparseScene seen =
+        calib::ToSparseScene(found, names, std::vector<PinholeCamera>(names.size(), view));
+    EXPECT_GT(seen.observations.size(), 500u);
+    for (const SparseObservation& o : seen.observations) {
+      EXPECT_TRUE(o.pixel.x() >= 0 && o.pixel.x() <= view.width_px() && o.pixel.y() >= 0 &&
+                  o.pixel.y() <= view.height_px());
     }
     std::vector<Eigen::Vector3d> centres, exact_centres;
     double extent = 0;
