@@ -5,14 +5,10 @@
 #include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "calib/sparse_from_sfm.h"
-#include "capture/duplicates.h"
-#include "capture/ingest.h"
-#include "capture/store.h"
-#include "capture/video/frames.h"
 #include "dtr/base/error.h"
-#include "dtr/base/hash.h"
 #include "dtr/base/machine.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/eval/json.h"
@@ -22,15 +18,12 @@
 #include "dtr/io/validation_result.h"
 #include "pipeline/advise.h"
 #include "pipeline/calibrate.h"
-#include "pipeline/capture.h"
-#include "pipeline/detail/cameras/camera_formats.h"
 #include "pipeline/detail/depth/depth_engine.h"
 #include "pipeline/detail/depth/depth_stage.h"
 #include "pipeline/detail/pages/set_page.h"
-#include "pipeline/detail/photos/holdout.h"
-#include "pipeline/detail/photos/input_hash.h"
 #include "pipeline/detail/photos/undistort_photos.h"
 #include "pipeline/detail/reports/build_json.h"
+#include "pipeline/detail/run/build_inputs.h"
 #include "pipeline/detail/run/build_options.h"
 #include "pipeline/detail/run/build_share.h"
 #include "pipeline/detail/run/finishing.h"
@@ -38,112 +31,12 @@
 #include "pipeline/detail/run/part_files.h"
 #include "pipeline/detail/run/recorded_notes.h"
 #include "pipeline/detail/run/run_log.h"
-#include "pipeline/model_grid.h"
 #include "pipeline/validate.h"
 
 namespace dtr::pipeline {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-std::vector<std::string> NamesOf(const capture::Capture& capture) {
-  std::vector<std::string> names;
-  for (const capture::Photo& photo : capture.photos) names.push_back(photo.name);
-  return names;
-}
-
-// Photos by name, size and content: equal values mean the same input. Hashes of held-out photos are
-// for the fingerprint alone: nothing of their pixels may enter the set outside held_out/.
-Json PhotosJson(const capture::Capture& capture, const std::vector<bool>& with_hash) {
-  Json photos = Json::array();
-  for (size_t i = 0; i < capture.photos.size(); ++i) {
-    const capture::Photo& photo = capture.photos[i];
-    photos.push_back(
-        {{"name", photo.name}, {"width_px", photo.width_px}, {"height_px", photo.height_px}});
-    if (with_hash[i]) photos.back()["sha256"] = photo.source_sha256;
-    if (with_hash[i] && !photo.mask_sha256.empty()) {
-      photos.back()["mask_sha256"] = photo.mask_sha256;
-    }
-    if (const auto& frame = photo.video_frame) {
-      photos.back()["video"] = frame->video;
-      photos.back()["frame"] = frame->number;
-    }
-  }
-  return photos;
-}
-
-// What a capture holds now, as its list only tells what its photos were made of.
-Json StoredHashes(const capture::Capture& capture) {
-  Json hashes = Json::array();
-  for (const capture::Photo& photo : capture.photos) {
-    hashes.push_back(Sha256OfFile(photo.file));
-    if (!photo.mask_file.empty()) hashes.push_back(Sha256OfFile(photo.mask_file));
-  }
-  return hashes;
-}
-
-// The sizes that photos for SfM have, or frames of the videos will.
-std::vector<std::pair<int, int>> SizesOf(const BuildOptions& options,
-                                         const capture::Capture& photos,
-                                         const std::vector<bool>& held_out) {
-  std::vector<std::pair<int, int>> sizes;
-  for (const std::filesystem::path& file : capture::VideosOf(options.photos)) {
-    capture::VideoReader video(file);
-    if (!video.Next()) continue;
-    const ImageRgb8 picture = video.Picture();
-    sizes.emplace_back(picture.width(), picture.height());
-  }
-  for (size_t i = 0; i < photos.photos.size(); ++i) {
-    if (options.holdout_strict && i < held_out.size() && held_out[i]) continue;
-    sizes.emplace_back(photos.photos[i].width_px, photos.photos[i].height_px);
-  }
-  return sizes;
-}
-
-// What a video is known by before its frames are chosen: equal values give the same frames.
-Json VideoJson(const BuildOptions& options) {
-  return {{"sha256", InputHash(capture::VideosOf(options.photos))},
-          {"every", options.video.every},
-          {"motion", options.video.motion},
-          {"max_frames", options.video.most},
-          {"synchronised", options.video.synchronised}};
-}
-
-// Which photos are held out; of panoramas whole ones.
-std::vector<bool> HeldOutOf(const std::string& spec, const capture::Capture& photos) {
-  if (photos.photos.empty() || !photos.photos.front().face) {
-    return ChooseHeldOut(spec, NamesOf(photos));
-  }
-  std::vector<std::string> panoramas;
-  for (const capture::Photo& photo : photos.photos) {
-    panoramas.push_back(photo.face ? photo.face->panorama : "");
-  }
-  return ChooseHeldOutPanoramas(spec, NamesOf(photos), panoramas);
-}
-
-// The frames of a video, chosen once, and the views of panoramas: a later run of the same build
-// finds them in `folder`.
-capture::Capture FramesOf(const BuildOptions& options, const std::filesystem::path& folder,
-                          bool is_shared, Progress& progress) {
-  const std::filesystem::path kept = folder / "capture", fresh = folder / "frames";
-  if (!std::filesystem::exists(kept / capture::kCaptureFile)) {
-    if (is_shared) {
-      throw Error(kept.string() +
-                  ": expected the frames that the stage capture chooses, found none; run that "
-                  "stage first");
-    }
-    capture::VideoOptions video = options.video;
-    video.threads = options.threads;
-    video.memory_gb = options.depth.memory_gb.value_or(kDefaultMemoryGb);
-    const capture::Capture frames = Ingest(
-        options.photos, video, options.panoramas, [&] { return fresh; }, progress);
-    capture::WriteCapture(
-        frames, kept, {.replace = false, .threads = options.threads, .memory_gb = video.memory_gb},
-        progress);
-    std::filesystem::remove_all(fresh);
-  }
-  return capture::ReadCapture(kept);
-}
 
 SparseScene SparseOf(const CalibratedPhotos& calibrated, const std::vector<View>& views) {
   std::vector<std::string> names;
@@ -179,23 +72,6 @@ std::vector<SparsePoint> SourcePoints(const SparseScene& sparse, const std::vect
   std::vector<bool> is_source;
   for (const View& view : views) is_source.push_back(view.role == ViewRole::kSource);
   return RestrictToViews(sparse, is_source).points;
-}
-
-// Photos that are there twice add nothing, and would show what is held out. Given places say that
-// they are photos of their own; those of a rig belong to its time steps.
-void LeaveOutSameImages(const BuildOptions& options, capture::Capture& photos, Progress& progress) {
-  if (options.keep_duplicates || !options.poses.empty() || !options.rig.empty()) return;
-  const auto left_out = capture::DropSameImages(
-      photos, [&](const std::string& name) { return IsNamed(options.holdout, name); });
-  for (const auto& [name, same_as] : left_out) {
-    progress.Note(name + " left out: it has the same pixels as " + same_as);
-  }
-}
-
-// Of the cameras and of the lists that their reader takes in.
-std::string PosesHash(const std::filesystem::path& poses) {
-  const std::vector<std::filesystem::path> files = WithCompanions(poses);
-  return files.size() > 1 ? InputHash(files) : InputHash(poses);
 }
 
 void RequireTwoSources(const capture::Capture& capture, const std::vector<bool>& held_out,
@@ -242,16 +118,6 @@ void AdviseOn(const std::filesystem::path& folder, DtrSet set, BuildReport& repo
   report.coverage = AdviceLines(advise::Advise(views, options, progress));
 }
 
-// One line about what screening found, if it found anything.
-void SayRemarks(const BuildReport& report, size_t photos, Progress& progress) {
-  if (report.screening.empty()) return;
-  const auto& [name, remarks] = report.screening.front();
-  progress.Note(
-      fmt::format("screening: {} of {} photos have a remark and are used, first {}: {}; "
-                  "dtr capture `drop` leaves such photos out",
-                  report.screening.size(), photos, name, remarks.front()));
-}
-
 // What other processes did of these stages counts as an earlier run's work.
 void AddParts(const std::filesystem::path& work, const std::vector<std::string>& stages,
               RunLog& log) {
@@ -273,6 +139,52 @@ CalibratedPhotos CamerasOf(const capture::Capture& photos, const CalibrateOption
   if (share.Is("calibration")) FreezeCalibration(calibrated, work);
   share.EndAfter("calibration");
   return calibrated;
+}
+
+CalibrateOptions CalibrateOptionsFor(const BuildOptions& options, const BuildInputs& inputs,
+                                     double memory_gb, const BuildShare& share) {
+  CalibrateOptions calibrate;
+  calibrate.poses = options.poses;
+  calibrate.poses_format = options.poses_format;
+  calibrate.held_out = inputs.held_out;
+  calibrate.strict = options.holdout_strict;
+  calibrate.threads = options.threads;
+  calibrate.seed = options.seed;
+  calibrate.memory_gb = memory_gb;
+  calibrate.refine = options.refine;
+  calibrate.refine_poses = options.refine_poses;
+  calibrate.rig = inputs.rig;
+  calibrate.metres = options.metres;
+  calibrate.sfm = options.sfm;
+  calibrate.part = share.Sfm();
+  return calibrate;
+}
+
+void ReportCalibration(const CalibratedPhotos& calibrated, const BuildInputs& inputs,
+                       BuildReport& report) {
+  report.not_registered = calibrated.not_registered;
+  report.why_not_registered = calibrated.why_not_registered;
+  const auto& lost = report.not_registered;
+  for (size_t i = 0; i < inputs.held_out.size(); ++i) {
+    const std::string& name = inputs.photos.photos[i].name;
+    if (inputs.held_out[i] && std::find(lost.begin(), lost.end(), name) != lost.end()) {
+      report.held_out_not_registered.push_back(name);
+    }
+  }
+}
+
+// What depth that was found becomes in the set.
+void FinishDepth(const BuildOptions& options, const SparseScene& sparse, double memory_gb,
+                 io::SetWriter& writer, DtrSet& set, Progress& progress) {
+  FinishScene(set, SourcePoints(sparse, set.frames.front().views), writer, options.threads,
+              progress);
+  if (options.depth.depth_error_px) {
+    RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads, memory_gb, progress);
+  }
+  if (options.depth.completion) {
+    CompleteDepth(set, sparse, writer, options.threads, memory_gb, progress);
+  }
+  WriteMeshes(set, writer, options.threads, progress);
 }
 
 // A process with a part of depth needs the images of all views.
@@ -300,118 +212,30 @@ BuildReport BuildOrPart(const BuildOptions& options, Progress& listener) {
   RequireCalibration(options.poses, options.poses_format, options.sfm);
   io::SetWriter::RequireTarget(options.output, options.force);
   log.Begin("capture");
-  const bool from_video = !capture::VideosOf(options.photos).empty();
-  bool is_derived = from_video;  // photos are made, in the work folder
-  capture::Capture photos;
-  std::vector<bool> held_out;
-  const auto look = [&] {
-    LeaveOutSameImages(options, photos, progress);
-    capture::RequireEnoughPhotos(photos, options.photos);
-    if (!options.poses.empty())
-      TakePhotosAsCamerasDo(options.poses, options.poses_format, photos, progress);
-    held_out = HeldOutOf(options.holdout, photos);
-    if (options.poses.empty()) {
-      if (auto panoramas = RigOfPanoramas(photos)) {
-        RequirePanoramaOptions(options);
-        rig = std::move(panoramas);
-      }
-    }
-    RequireMetres(options.metres, photos, options.photos.string(),
-                  options.holdout_strict ? held_out : std::vector<bool>());
-    if (!rig) return;
-    (void)PhotosOfRig(*rig, photos);  // rejected here, before any work
-    if (!calib::HasOneCentre(rig->known)) TellPhotosTheirLens(*rig, photos);
-  };
-  if (!from_video) {
-    photos = capture::IngestPhotos(options.photos,
-                                   {.threads = options.threads, .memory_gb = memory_gb}, progress);
-    is_derived = capture::ArePanoramas(photos, options.panoramas);
-    if (is_derived && options.poses.empty()) RequirePanoramaOptions(options);
-    if (!is_derived) look();
-  }
-  Json fingerprint = {
-      {"tool_version", DTR_VERSION},
-      {"options", OptionsJson(options, quality)},
-      {"time_budget_s", options.depth.time_budget_s.value_or(0)},
-      {"photos", from_video ? VideoJson(options)
-                            : PhotosJson(photos, std::vector<bool>(photos.photos.size(), true))},
-      {"poses_sha256", PosesHash(options.poses)},
-      {"workspace_sha256", InputHash(options.depth.workspace)},
-      {"prior_sha256", InputHash(options.depth.prior.folder)}};
-  if (!options.rig.empty()) fingerprint["rig_sha256"] = InputHash(options.rig);
-  if (options.panoramas != capture::PanoramaUse::kAuto) {
-    fingerprint["panoramas"] = options.panoramas == capture::PanoramaUse::kAlways;
-  }
-  if (std::filesystem::exists(options.photos / capture::kCaptureFile)) {
-    fingerprint["stored_sha256"] = StoredHashes(photos);
-  }
-  if (NeedsFeatures(options.poses, options.poses_format)) {
-    // COLMAP looks for features, of a size that is the one thing --memory decides of the result.
-    const auto sizes = SizesOf(options, photos, held_out);
-    if (!sizes.empty()) {
-      fingerprint["feature_image_size_px"] =
-          FeatureImageSizePx(sizes, memory_gb, options.sfm.feature_size_px);
-    }
-  }
+  BuildInputs inputs = LookAtInputs(options, std::move(rig), memory_gb, progress);
+  const Json fingerprint = FingerprintOf(options, quality, inputs, memory_gb);
   const std::string before_depth = BeforeDepth(options, fingerprint).dump();
   if (!options.part) io::HandOver(options.output, before_depth, fingerprint.dump());
   io::SetWriter writer = share.OpenWriter(options, fingerprint.dump());
   share.Lock(writer.work_folder());
   if (!options.force_stage.empty()) ForgetStage(writer.folder(), options.force_stage);
-  if (is_derived) {
-    photos = FramesOf(options, writer.work_folder(), share.is_shared(), progress);
-    try {
-      look();
-    } catch (const Error&) {
-      // What was asked for cannot be had of these frames: nothing goes on from here, and the
-      // command that is mended must not find this one's work in its way.
-      if (!std::filesystem::exists(writer.work_folder() / "calibration")) writer.Discard();
-      throw;
-    }
+  if (inputs.is_derived) {
+    DerivePhotos(options, share.is_shared(), writer, inputs, progress);
   }
-  report.contents = photos.contents;
-  for (const auto& skipped : photos.skipped)
-    report.skipped.emplace_back(skipped.name, skipped.reason);
-  for (const auto& remark : photos.remarks) {
-    report.remarks.emplace_back(remark.name, remark.text);
-    progress.Note(fmt::format("{}: {}", remark.name, remark.text));
-  }
-  for (const capture::Photo& photo : photos.photos) {
-    if (!photo.screening || photo.screening->remarks.empty()) continue;
-    report.screening.emplace_back(photo.name, photo.screening->remarks);
-  }
-  SayRemarks(report, photos.photos.size(), progress);
+  const capture::Capture& photos = inputs.photos;
+  const std::vector<bool>& held_out = inputs.held_out;
+  ReportPhotos(photos, report, progress);
   std::vector<bool> is_source = held_out;
   is_source.flip();
 
   log.Begin("calibration");
-  CalibrateOptions calibrate;
-  calibrate.poses = options.poses;
-  calibrate.poses_format = options.poses_format;
-  calibrate.held_out = held_out;
-  calibrate.strict = options.holdout_strict;
-  calibrate.threads = options.threads;
-  calibrate.seed = options.seed;
-  calibrate.memory_gb = memory_gb;
-  calibrate.refine = options.refine;
-  calibrate.refine_poses = options.refine_poses;
-  calibrate.rig = rig;
-  calibrate.metres = options.metres;
-  calibrate.sfm = options.sfm;
-  calibrate.part = share.Sfm();
   const CalibratedPhotos calibrated =
-      CamerasOf(photos, calibrate, share, writer.work_folder(), progress);
+      CamerasOf(photos, CalibrateOptionsFor(options, inputs, memory_gb, share), share,
+                writer.work_folder(), progress);
   log.AddEarlier(calibrated.earlier_wall_s, calibrated.earlier_cpu_s);
   // Features know what their parts took.
   AddParts(writer.work_folder(), {"matching", "verification"}, log);
-  report.not_registered = calibrated.not_registered;
-  report.why_not_registered = calibrated.why_not_registered;
-  for (size_t i = 0; i < held_out.size(); ++i) {
-    const auto& lost = report.not_registered;
-    if (held_out[i] && std::find(lost.begin(), lost.end(), photos.photos[i].name) != lost.end()) {
-      report.held_out_not_registered.push_back(photos.photos[i].name);
-    }
-  }
+  ReportCalibration(calibrated, inputs, report);
 
   log.Begin("undistortion");
   AddParts(writer.work_folder(), {"undistortion"}, log);
@@ -446,14 +270,7 @@ BuildReport BuildOrPart(const BuildOptions& options, Progress& listener) {
   report.prior = stage.prior;
 
   log.Begin("finishing");
-  FinishScene(set, SourcePoints(sparse, views), writer, options.threads, progress);
-  if (options.depth.depth_error_px) {
-    RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads, memory_gb, progress);
-  }
-  if (options.depth.completion) {
-    CompleteDepth(set, sparse, writer, options.threads, memory_gb, progress);
-  }
-  WriteMeshes(set, writer, options.threads, progress);
+  FinishDepth(options, sparse, memory_gb, writer, set, progress);
   set.provenance_json = ProvenanceJson(options, OptionsJson(options, stage.quality),
                                        PhotosJson(photos, is_source), calibrated, report)
                             .dump();
