@@ -10,7 +10,6 @@
 
 #include "calib/bundle/covariance.h"
 #include "calib/bundle/held_out.h"
-#include "calib/bundle/refine_independent.h"
 #include "dtr/base/error.h"
 #include "dtr/base/order_statistics.h"
 #include "dtr/base/parallel_for.h"

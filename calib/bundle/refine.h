@@ -83,6 +83,14 @@ struct Refined : RefineReport {
 /// those of RequireDetermined where options.determined asks for it.
 Refined Refine(const SfmModel& model, const RefineOptions& options);
 
+/// Refine of a model whose cameras were fitted to other data than its observations, such
+/// as cameras of a file with points triangulated afterwards. As they have seen no observation, they
+/// are a candidate like the others: the result is taken only if cameras adjusted to half of the
+/// points predict the other half better than the cameras as given, beyond the bootstrap interval.
+/// RefineReport::held_out_observations counts these points, given_px and adjusted_px are of them.
+/// Priors and known lenses are Refine's.
+Refined RefineIndependent(const SfmModel& model, const RefineOptions& options);
+
 /// In what ways the views of a model do not suffice (degeneracy.h), its poses, points and lenses
 /// free as Refine leaves them, what is known beside the observations held. At most 4000 points take
 /// part. A model with a FOV lens has none to tell of.

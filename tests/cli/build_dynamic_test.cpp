@@ -182,6 +182,7 @@ TEST_F(BuildDynamic, ClocksThatDifferAreFoundFromWhatMoves) {
   const int later[] = {0, 3, 0, -2, 0};
   for (size_t c = 0; c < 5; ++c) {
     EXPECT_EQ(clocks[c]["frames_taken_later"], later[c]);
+    // The nearest frame is taken: half a frame off would be the wrong one.
     EXPECT_NEAR(clocks[c]["frames_later"], later[c], 0.3);
   }
 }

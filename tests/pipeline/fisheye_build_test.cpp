@@ -9,41 +9,28 @@
 #include "calib/similarity.h"
 #include "calib/sparse_from_sfm.h"
 #include "capture/ingest.h"
-#include "datasets/make.h"
 #include "dtr/base/error.h"
 #include "dtr/io/formats/cameras_json.h"
 #include "pipeline/calibrate.h"
+#include "tests/pipeline/dataset_once.h"
 #include "tests/support/message_of.h"
-#include "tests/support/test_data.h"
 
 namespace dtr::pipeline {
 namespace {
 
-using dtr::testing::TemporaryFolder;
-
 // Photos of a fisheye of 173 degrees across, with a lens that is not quite equidistant.
-class Fisheye : public ::testing::Test {
+class Fisheye : public dtr::testing::DatasetOnce {
  protected:
   static constexpr double kK1 = -0.03, kK2 = 0.004;
 
   static void SetUpTestSuite() {
-    folder_ = new TemporaryFolder;
-    datasets::DatasetSpec spec;
-    spec.scene = "courtyard";
-    spec.views = 12;
-    spec.width_px = 640;
+    datasets::DatasetSpec spec = Scene("courtyard", 12, 640);
     spec.height_px = 480;
     spec.focal_35mm = 12;
-    spec.supersampling = 2;
     spec.fisheye = true;
     spec.k1 = kK1;
     spec.k2 = kK2;
-    SilentProgress silent;
-    datasets::MakeDataset(spec, *folder_ / "yard", 2, silent);
-  }
-  static void TearDownTestSuite() {
-    delete folder_;
-    folder_ = nullptr;
+    Make(spec, "yard");
   }
   // Without EXIF only the photos tell the focal length.
   static CalibratedPhotos Calibrated(const std::string& lens_model, bool exif) {
@@ -59,9 +46,7 @@ class Fisheye : public ::testing::Test {
     return CalibratePhotos(photos, options, *folder_ / (lens_model + (exif ? "" : "_alone")),
                            silent);
   }
-  static TemporaryFolder* folder_;
 };
-TemporaryFolder* Fisheye::folder_ = nullptr;
 
 TEST_F(Fisheye, CamerasOfThePhotosAloneAreThoseOfTheTruth) {
   const io::CameraList truth = io::ReadCamerasJson(*folder_ / "yard/cameras.json");

@@ -9,7 +9,6 @@
 
 #include "calib/colmap/model_io.h"
 #include "capture/ingest.h"
-#include "datasets/make.h"
 #include "dtr/base/error.h"
 #include "dtr/base/random.h"
 #include "dtr/io/formats/cameras_json.h"
@@ -17,36 +16,25 @@
 #include "pipeline/build.h"
 #include "pipeline/calibrate.h"
 #include "pipeline/import.h"
+#include "tests/pipeline/dataset_once.h"
 #include "tests/support/message_of.h"
 #include "tests/support/noted_lines.h"
-#include "tests/support/test_data.h"
 
 namespace dtr::pipeline {
 namespace {
 
 using dtr::testing::MessageOf;
 using dtr::testing::NotedLines;
-using dtr::testing::TemporaryFolder;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-class GivenCameras : public ::testing::Test {
+class GivenCameras : public dtr::testing::DatasetOnce {
  protected:
   static void SetUpTestSuite() {
-    folder_ = new TemporaryFolder;
-    datasets::DatasetSpec spec;
-    spec.scene = "courtyard";
-    spec.views = 8;
-    spec.width_px = 480;
+    datasets::DatasetSpec spec = Scene("courtyard", 8, 480);
     spec.height_px = 320;
-    spec.supersampling = 2;
-    SilentProgress silent;
-    datasets::MakeDataset(spec, *folder_ / "room", 2, silent);
-  }
-  static void TearDownTestSuite() {
-    delete folder_;
-    folder_ = nullptr;
+    Make(spec, "room");
   }
   struct Built {
     std::vector<std::string> lines;
@@ -122,9 +110,7 @@ class GivenCameras : public ::testing::Test {
     ADD_FAILURE() << "no test " << name << " in " << set.validation_json.substr(0, 300);
     return {};
   }
-  static TemporaryFolder* folder_;
 };
-TemporaryFolder* GivenCameras::folder_ = nullptr;
 
 TEST_F(GivenCameras, RightOnesPassAndNothingIsReported) {
   const Built built = Build("right", [](io::NamedCamera&) {});

@@ -7,15 +7,14 @@
 
 #include "calib/similarity.h"
 #include "capture/store.h"
-#include "datasets/make.h"
 #include "dtr/base/error.h"
 #include "dtr/io/formats/cameras_json.h"
 #include "dtr/io/set_io.h"
 #include "pipeline/build.h"
 #include "pipeline/capture.h"
+#include "tests/pipeline/dataset_once.h"
 #include "tests/support/message_of.h"
 #include "tests/support/noted_lines.h"
-#include "tests/support/test_data.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -23,7 +22,6 @@ namespace {
 namespace fs = std::filesystem;
 using dtr::testing::MessageOf;
 using dtr::testing::NotedLines;
-using dtr::testing::TemporaryFolder;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 
@@ -31,22 +29,12 @@ constexpr int kPanoramas = 6;
 // Measured with 36 views of 244 px: 0.0004 m and 0.0003 rad; four times that.
 constexpr double kMaxCentreError = 0.0016, kMaxTurnRad = 0.001;
 
-class PanoramaBuild : public ::testing::Test {
+class PanoramaBuild : public dtr::testing::DatasetOnce {
  protected:
   static void SetUpTestSuite() {
-    folder_ = new TemporaryFolder;
-    datasets::DatasetSpec spec;
-    spec.scene = "room";
+    datasets::DatasetSpec spec = Scene("room", kPanoramas, 768);
     spec.panoramas = true;
-    spec.views = kPanoramas;
-    spec.width_px = 768;
-    spec.supersampling = 2;
-    SilentProgress silent;
-    datasets::MakeDataset(spec, *folder_ / "walk", 2, silent);
-  }
-  static void TearDownTestSuite() {
-    delete folder_;
-    folder_ = nullptr;
+    Make(spec, "walk");
   }
   static BuildOptions Options(const std::string& name) {
     BuildOptions options;
@@ -56,9 +44,7 @@ class PanoramaBuild : public ::testing::Test {
     options.sfm.engine = colmap::SfmEngine::kGlobal;
     return options;
   }
-  static TemporaryFolder* folder_;
 };
-TemporaryFolder* PanoramaBuild::folder_ = nullptr;
 
 TEST_F(PanoramaBuild, ViewsOfAPanoramaStandInOnePointWhereTheyAre) {
   BuildOptions options = Options("set");

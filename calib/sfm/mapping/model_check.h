@@ -9,10 +9,10 @@ namespace dtr::sfm {
 
 /// Why a model of these matches must not be trusted, by the tests of the global mapper's own model
 /// that ask matches and points, not how they were mapped (global_mapper.h, why_not): few of the
-/// matches became points, a focal length is off the known one (pairs agree on it; what EXIF
-/// alone says is none) by a factor of 2, many
-/// lie in pairs that contradict its cameras, or a part of it hangs on the rest by too few points of
-/// known depth to have its scale. One clause; empty: it can be trusted. Images are found by their
+/// matches became points, a focal length is off the graph's known one by more than a factor of 2,
+/// many matches lie in pairs that contradict its cameras, or a part of it hangs on the rest by too
+/// few points of known depth to have its scale. `graph`: a focal length counts as known there where
+/// pairs of photos agree on it. One clause; empty: it can be trusted. Images are found by their
 /// names, features by their order. Throws std::invalid_argument where an image of the model is none
 /// of the graph's or has other features.
 std::string WhyContradicted(const ViewGraph& graph, const calib::SfmModel& model, int threads);

@@ -6,7 +6,6 @@
 #include <map>
 #include <set>
 
-#include "calib/bundle/refine_independent.h"
 #include "dtr/base/error.h"
 #include "dtr/io/json_fields.h"
 
