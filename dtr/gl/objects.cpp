@@ -147,6 +147,15 @@ StateGuard::StateGuard() {
     glGetIntegerv(GL_SAMPLER_BINDING, &unit.sampler);
     glBindSampler(static_cast<GLuint>(i), 0);
   }
+  for (GLuint i = 0; i < image_units_.size(); ++i) {
+    ImageUnit& unit = image_units_[i];
+    glGetIntegeri_v(GL_IMAGE_BINDING_NAME, i, &unit.texture);
+    glGetIntegeri_v(GL_IMAGE_BINDING_LEVEL, i, &unit.level);
+    glGetIntegeri_v(GL_IMAGE_BINDING_LAYERED, i, &unit.layered);
+    glGetIntegeri_v(GL_IMAGE_BINDING_LAYER, i, &unit.layer);
+    glGetIntegeri_v(GL_IMAGE_BINDING_ACCESS, i, &unit.access);
+    glGetIntegeri_v(GL_IMAGE_BINDING_FORMAT, i, &unit.format);
+  }
   // What both passes take for granted.
   for (const Capability& capability : capabilities_) glDisable(capability.name);
   glDisable(GL_BLEND);
@@ -171,6 +180,11 @@ StateGuard::~StateGuard() {
     glBindSampler(static_cast<GLuint>(i), name(unit.sampler));
   }
   glActiveTexture(name(active_unit_));
+  for (GLuint i = 0; i < image_units_.size(); ++i) {
+    const ImageUnit& unit = image_units_[i];
+    glBindImageTexture(i, name(unit.texture), unit.level, unit.layered != 0 ? GL_TRUE : GL_FALSE,
+                       unit.layer, name(unit.access), name(unit.format));
+  }
   for (const Capability& capability : capabilities_) {
     SetEnabled(capability.name, capability.on == GL_TRUE);
   }

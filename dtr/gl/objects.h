@@ -93,7 +93,12 @@ class StateGuard {
     static IndexedBuffer Of(GLenum target, GLuint index);
     void Bind(GLenum target, GLuint index) const;
   };
+  /// A texture that shaders write into.
+  struct ImageUnit {
+    GLint texture = 0, level = 0, layered = 0, layer = 0, access = 0, format = 0;
+  };
   std::array<Unit, kTextureUnits> units_;
+  std::array<ImageUnit, 3> image_units_;
   std::vector<Capability> capabilities_;
   GLint program_ = 0, vertex_array_ = 0, draw_framebuffer_ = 0, read_framebuffer_ = 0;
   GLint viewport_[4] = {}, active_unit_ = 0;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "dtr/base/error.h"
 #include "dtr/render/blend_weights.h"
@@ -17,7 +18,8 @@ static_assert(sizeof(ViewBlock) == 11 * 16, "std430: eleven vec4");
 constexpr int kMaxImageArrays = StateGuard::kTextureUnits - 1;
 // Variants of the resolving shader hold so many views, doubled until all fit.
 constexpr int kMinViews = 8;
-constexpr GLuint kViewsBinding = 0, kResolveDepthBinding = 2;  // as in resolve.frag
+constexpr int kGroupPx = 8;                                    // a side of a group
+constexpr GLuint kViewsBinding = 0, kResolveDepthBinding = 2;  // as in resolve.comp
 
 std::array<float, 4> Row(const Eigen::Vector3d& row, double last) {
   return {static_cast<float>(row.x()), static_cast<float>(row.y()), static_cast<float>(row.z()),
@@ -83,9 +85,19 @@ void BindArrays(const Uniforms& set, const std::string& name, const std::vector<
   }
 }
 
+/// The image units of resolve.comp.
+void WriteInto(const Targets& targets) {
+  const std::array<std::pair<GLuint, GLenum>, 3> results = {{{targets.image.name(), GL_RGBA8},
+                                                             {targets.depth.name(), GL_R32F},
+                                                             {targets.marks.name(), GL_RGBA8UI}}};
+  for (GLuint i = 0; i < results.size(); ++i) {
+    glBindImageTexture(i, results[i].first, 0, GL_TRUE, 0, GL_WRITE_ONLY, results[i].second);
+  }
+}
+
 }  // namespace
 
-Resolver::Resolver() : empty_array_(VertexArray::Make()), view_buffer_(Buffer::Make()) {
+Resolver::Resolver() : view_buffer_(Buffer::Make()) {
   glGetIntegerv(GL_MAX_UNIFORM_BLOCK_SIZE, &max_uniform_bytes_);
 }
 
@@ -137,7 +149,7 @@ const Program& Resolver::ProgramFor(const RenderFrame& frame, ProgramCache& prog
     return std::string(name) + " " + std::to_string(static_cast<long>(value));
   };
   return programs.Get(
-      {{GL_VERTEX_SHADER, "full_screen.vert"}, {GL_FRAGMENT_SHADER, "resolve.frag"}},
+      {{GL_COMPUTE_SHADER, "resolve.comp"}},
       {define("MAX_VIEWS", RoomFor(views)), define("IMAGE_ARRAYS", image_arrays_.size()),
        define("DEPTH_ARRAYS", depth_arrays_.size()),
        define("BLEND", BlendNumber(frame.options.blend)),
@@ -164,6 +176,7 @@ void Resolver::Draw(const RenderFrame& frame, const Band& band, const ViewStore&
   set.Set("pixel_angle_rad", blend.pixel_angle_rad);
   set.Set("least_inverse_depth", blend.least_inverse_depth);
   set.Set("width_px", frame.novel.width_px());
+  set.Set("rows", band.count);
   if (frame.exposure != Eigen::Vector3d::Ones()) set.Set("exposure", frame.exposure);
   set.Set("layers", 0);
   glActiveTexture(GL_TEXTURE0);
@@ -176,10 +189,12 @@ void Resolver::Draw(const RenderFrame& frame, const Band& band, const ViewStore&
   if (frame.deferred()) {
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, kResolveDepthBinding, coarse_depth);
   }
-  glBindFramebuffer(GL_FRAMEBUFFER, targets.result_framebuffer.name());
-  glViewport(0, 0, frame.novel.width_px(), band.count);
-  glBindVertexArray(empty_array_.name());
-  glDrawArrays(GL_TRIANGLES, 0, 3);
+  WriteInto(targets);
+  glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);  // who still reads the last image
+  const auto groups = [](int pixels) { return static_cast<GLuint>((pixels - 1) / kGroupPx + 1); };
+  glDispatchCompute(groups(frame.novel.width_px()), groups(band.count), 1);
+  glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_FRAMEBUFFER_BARRIER_BIT |
+                  GL_TEXTURE_UPDATE_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
 }
 
 }  // namespace dtr::gl

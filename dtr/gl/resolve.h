@@ -11,7 +11,9 @@
 
 namespace dtr::gl {
 
-/// SPEC 4.2 to 4.7, 5.2 and 6. Once per image SetViews, then Draw for every band.
+/// SPEC 4.2 to 4.7, 5.2 and 6, as a compute shader: GPUs of data centres run compute on all their
+/// multiprocessors, fragments on a few (docs/accuracy/SPEED.md). Once per image SetViews, then Draw
+/// for every band.
 class Resolver {
  public:
   /// Asks the driver for its limits: a context must be current.
@@ -32,7 +34,6 @@ class Resolver {
   const Program& ProgramFor(const RenderFrame& frame, ProgramCache& programs) const;
 
   GLint max_uniform_bytes_ = 0;
-  VertexArray empty_array_;
   Buffer view_buffer_;
   std::vector<int> image_arrays_, depth_arrays_;  ///< store numbers, by the slot they are bound to
 };

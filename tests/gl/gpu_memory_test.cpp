@@ -5,6 +5,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/gl/drawing.h"
+#include "dtr/gl/driver.h"
 #include "dtr/gl/texture_arrays.h"
 #include "tests/gl/gl_testing.h"
 #include "tests/simd/many_views.h"
@@ -150,6 +151,8 @@ TEST_F(GpuMemoryFull, IsSaidInOneLine) {
   Targets targets;
   try {
     targets.Fit(largest, largest, layers);  // terabytes: no driver has them
+    // NVIDIA's takes memory when it is first drawn into.
+    if (!DrawsOnProcessor()) GTEST_SKIP() << "this driver promises memory that it does not have";
     FAIL() << "memory without end";
   } catch (const Error& error) {
     const std::string line = error.what();

@@ -151,6 +151,7 @@ TEST_F(Render, LeavesTheContextsStateAsItWas) {
   glBindVertexArray(array.name());
   glBindBuffer(GL_ARRAY_BUFFER, buffer.name());
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, buffer.name());
+  glBindImageTexture(1, texture.name(), 0, GL_TRUE, 0, GL_READ_WRITE, GL_R32UI);
   glBindFramebuffer(GL_DRAW_FRAMEBUFFER, framebuffer.name());
 
   const NamedScene scene = ParityScenes().front();
@@ -193,6 +194,16 @@ TEST_F(Render, LeavesTheContextsStateAsItWas) {
   GLint storage = 0;
   glGetIntegeri_v(GL_SHADER_STORAGE_BUFFER_BINDING, 0, &storage);
   EXPECT_EQ(storage, static_cast<GLint>(buffer.name()));
+  const auto image_unit_1 = [](GLenum name) {
+    GLint v = 0;
+    glGetIntegeri_v(name, 1, &v);
+    return v;
+  };
+  EXPECT_EQ(image_unit_1(GL_IMAGE_BINDING_NAME), static_cast<GLint>(texture.name()));
+  EXPECT_EQ(image_unit_1(GL_IMAGE_BINDING_LAYERED), GL_TRUE);
+  EXPECT_EQ(image_unit_1(GL_IMAGE_BINDING_ACCESS), GL_READ_WRITE);
+  EXPECT_EQ(image_unit_1(GL_IMAGE_BINDING_FORMAT), GL_R32UI);
+  glBindImageTexture(1, 0, 0, GL_FALSE, 0, GL_READ_ONLY, GL_R8);
   GLboolean mask[4];
   glGetBooleanv(GL_COLOR_WRITEMASK, mask);
   EXPECT_EQ(std::vector<GLboolean>(mask, mask + 4),

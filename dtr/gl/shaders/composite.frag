@@ -13,15 +13,18 @@ uniform vec4 image_from_pixel;  // position in the image, 0 to 1 = pixel of the 
 
 layout(location = 0) out vec4 out_colour;
 
+// The pixel of the picture by its number: which one a sampler takes near the border of two differs
+// by driver. A pixel's centre lies half a pixel inside the viewport, its texel inside the picture.
 void main() {
-  // A pixel's centre lies half a pixel inside the viewport, its texel inside the picture.
+  ivec2 texel = ivec2((gl_FragCoord.xy * image_from_pixel.xy + image_from_pixel.zw) *
+                      vec2(textureSize(image, 0).xy));
 #if MAPPED
-  vec2 place = gl_FragCoord.xy * image_from_pixel.xy + image_from_pixel.zw;
+  float z = texelFetch(depth, texel, 0).r;
+  vec4 colour = texelFetch(image, texel, 0);
 #else
-  vec3 place = vec3(gl_FragCoord.xy * image_from_pixel.xy + image_from_pixel.zw, 0.0);
+  float z = texelFetch(depth, ivec3(texel, 0), 0).r;
+  vec4 colour = texelFetch(image, ivec3(texel, 0), 0);
 #endif
-  float z = texture(depth, place).r;
-  vec4 colour = texture(image, place);
 #if MAPPED
   if (z < 0.0) discard;
   gl_FragDepth = z;

@@ -2,10 +2,10 @@
 // the views' canonical order and one division: nothing depends on the order they were drawn in.
 // Defines: MAX_VIEWS, IMAGE_ARRAYS, DEPTH_ARRAYS (0: two passes, else SPEC 5), BLEND, PER_PIXEL,
 // LINEAR_LIGHT, EXPOSED, VIEWS_IN_UNIFORMS.
+layout(local_size_x = 8, local_size_y = 8) in;
 #if DEPTH_ARRAYS
 layout(std430, binding = 2) readonly buffer Depth { uint nearest[]; };  // SPEC 5.1
 uniform sampler2DArray depths[DEPTH_ARRAYS];
-uniform int width_px;
 #else
 uniform sampler2DArray layers;  // near_z / z in the novel camera, a layer per view; 0: none
 #endif
@@ -22,6 +22,7 @@ layout(std140, binding = 0) uniform Views { ViewBlock views[MAX_VIEWS]; };
 layout(std430, binding = 0) readonly buffer Views { ViewBlock views[]; };
 #endif
 
+uniform int width_px, rows;    // of the band
 uniform int view_count;
 uniform int nearest_views;     // K, for the per-pixel rule
 uniform vec4 novel_camera;     // fx, fy, cx, cy, pixels
@@ -38,9 +39,13 @@ vec3 Exposed(vec3 linear) {
 }
 #endif
 
-layout(location = 0) out vec4 out_image;   // sRGB; alpha 1 where seen
-layout(location = 1) out float out_depth;  // plane z of the front surface
-layout(location = 2) out uvec4 out_marks;  // view count, 255 at the Delta border, unused
+layout(rgba8, binding = 0) writeonly uniform image2DArray image_result;
+layout(r32f, binding = 1) writeonly uniform image2DArray depth_result;
+layout(rgba8ui, binding = 2) writeonly uniform uimage2DArray marks_result;
+
+vec4 out_image = vec4(0.0);   // sRGB; alpha 1 where seen
+float out_depth = 0.0;        // plane z of the front surface
+uvec4 out_marks = uvec4(0u);  // view count, 255 at the Delta border, unused
 
 const float kLargestFloat = 3.4e38;
 
@@ -154,13 +159,9 @@ float RankedAngle(int rank) {
   return max_angle_rad;
 }
 
-void main() {
-  ivec2 target = ivec2(gl_FragCoord.xy);
-  vec2 pixel = gl_FragCoord.xy + vec2(0.0, first_row);
+void Resolve(ivec2 target) {
+  vec2 pixel = vec2(target) + 0.5 + vec2(0.0, first_row);
   vec3 ray = vec3((pixel - novel_camera.zw) / novel_camera.xy, 1.0);
-  out_image = vec4(0.0);
-  out_depth = 0.0;
-  out_marks = uvec4(0u);
 
   // SPEC 4.2: front and border.
 #if DEPTH_ARRAYS
@@ -265,4 +266,13 @@ void main() {
 #endif
   out_image = vec4(clamp(mean, 0.0, 1.0), 1.0);
   out_marks = uvec4(uint(min(blended, 255)), at_border, 0u, 0u);
+}
+
+void main() {
+  ivec2 target = ivec2(gl_GlobalInvocationID.xy);
+  if (target.x >= width_px || target.y >= rows) return;
+  Resolve(target);
+  imageStore(image_result, ivec3(target, 0), out_image);
+  imageStore(depth_result, ivec3(target, 0), vec4(out_depth, 0.0, 0.0, 0.0));
+  imageStore(marks_result, ivec3(target, 0), out_marks);
 }
