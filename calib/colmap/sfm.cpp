@@ -125,10 +125,16 @@ bool AllHavePriors(const std::vector<CameraGroup>& groups) {
                       [](const CameraGroup& group) { return group.params.empty(); });
 }
 
-// What the mapper makes of photos of which it made nothing with free intrinsics.
+size_t PhotosOf(const std::vector<calib::SfmModel>& made) {
+  return made.empty() ? 0 : made.front().images.size();
+}
+
+// What the mapper makes of photos of which it made `free`, nothing or little, with free intrinsics;
+// `free` where that is no more.
 std::vector<calib::SfmModel> MadeOtherwise(Workspace& workspace, const fs::path& models,
                                            const std::vector<CameraGroup>& groups,
-                                           const SfmOptions& options) {
+                                           const SfmOptions& options,
+                                           std::vector<calib::SfmModel> free) {
   constexpr double kMaxPhotos = 0.75;
   std::vector<calib::SfmModel> fixed;
   if (AllHavePriors(groups)) {
@@ -136,21 +142,20 @@ std::vector<calib::SfmModel> MadeOtherwise(Workspace& workspace, const fs::path&
         "COLMAP made no model with free focal lengths; trying with those of EXIF, fixed");
     fixed = MadeIn(workspace, models, options, Mapping::kFixedIntrinsics);
   }
-  const auto photos = [](const std::vector<calib::SfmModel>& made) {
-    return made.empty() ? 0 : made.front().images.size();
-  };
   std::vector<calib::SfmModel> forward;
-  if (static_cast<double>(photos(fixed)) <
+  if (static_cast<double>(PhotosOf(fixed)) <
       kMaxPhotos * static_cast<double>(workspace.images().size())) {
     workspace.progress().Note(
         "COLMAP found no two photos to start from; trying two that may lie in line with what they "
         "see");
     forward = MadeIn(workspace, models, options, Mapping::kForwardMotion);
   }
-  const bool take_fixed = photos(fixed) > photos(forward);
+  const bool take_fixed = PhotosOf(fixed) > PhotosOf(forward);
+  std::vector<calib::SfmModel>& made = take_fixed ? fixed : forward;
+  if (!free.empty() && PhotosOf(made) <= PhotosOf(free)) return free;
   WriteFileAtomically(workspace.folder() / (take_fixed ? kFixedIntrinsicsNote : kForwardMotionNote),
                       "");
-  return take_fixed ? fixed : forward;
+  return std::move(made);
 }
 
 std::vector<calib::SfmModel> MadeByColmap(Workspace& workspace,
@@ -158,7 +163,10 @@ std::vector<calib::SfmModel> MadeByColmap(Workspace& workspace,
                                           const SfmOptions& options) {
   const fs::path models = workspace.folder() / "models";
   auto made = MadeIn(workspace, models, options, Mapping::kFree);
-  return made.empty() ? MadeOtherwise(workspace, models, groups, options) : made;
+  // COLMAP 3.10 leaves the two photos that it began with, to which none could be added; 3.8
+  // nothing.
+  const bool none = PhotosOf(made) <= 2 && PhotosOf(made) < workspace.images().size();
+  return none ? MadeOtherwise(workspace, models, groups, options, std::move(made)) : made;
 }
 
 void MappingStep(Workspace& workspace, const std::vector<CameraGroup>& groups,

@@ -233,6 +233,28 @@ TEST_F(RunSfmWithFake, WithoutAModelTheFocalLengthsOfExifAreFixed) {
   EXPECT_THAT(listener_.notes, Contains(HasSubstr("trying with those of EXIF, fixed")));
 }
 
+// The mapper leaves the two photos that it began with; with fixed intrinsics it goes on.
+constexpr char kTwoPhotosUnlessFixed[] =
+    "if ! tail -n 1 \"$here/calls\" | grep -q 'ba_refine_focal_length 0.*ba_refine_extra_params "
+    "0'; "
+    "then cp -r \"$here/model.0\" \"$output/0\"; exit 0; fi";
+
+TEST_F(RunSfmWithFake, AModelOfTheFirstTwoPhotosAloneIsAsGoodAsNone) {
+  fake_.Fail("mapper", kTwoPhotosUnlessFixed);
+  const SfmResult result = Run();
+  EXPECT_EQ(result.model.images.size(), 3u);
+  EXPECT_TRUE(result.report.fixed_intrinsics);
+  EXPECT_THAT(listener_.notes, Contains(HasSubstr("trying with those of EXIF, fixed")));
+}
+
+TEST_F(RunSfmWithFake, AModelOfTwoPhotosStaysWhereNothingGivesMore) {
+  fs::remove_all(fake_ / "model.1");
+  const SfmResult result = Run();
+  EXPECT_EQ(result.model.images.size(), 2u);
+  EXPECT_FALSE(result.report.fixed_intrinsics);
+  EXPECT_FALSE(result.report.forward_motion);
+}
+
 TEST_F(RunSfmWithFake, AFocalLengthThatExifDoesNotGiveIsNotFixed) {
   for (SfmImageInput& image : images_) image.focal_prior_px.reset();
   fake_.Fail("mapper", kOnlyFixed);
