@@ -68,14 +68,15 @@ bool SameButForPrincipalPoint(const LensCamera& a, const LensCamera& b) {
 
 std::vector<LensGroup> LensGroups(const std::map<std::uint32_t, LensCamera>& cameras) {
   std::vector<std::vector<std::uint32_t>> alike;
-  for (const auto& [id, camera] : cameras) {
+  for (const auto& entry : cameras) {
+    const LensCamera& camera = entry.second;  // a structured binding cannot be captured by Clang 14
     const auto found = std::find_if(alike.begin(), alike.end(), [&](const auto& ids) {
       return SameButForPrincipalPoint(cameras.at(ids.front()), camera);
     });
     if (found != alike.end()) {
       found->push_back(id);
     } else {
-      alike.push_back({id});
+      alike.push_back({entry.first});
     }
   }
   std::vector<LensGroup> groups;
