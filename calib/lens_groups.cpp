@@ -74,7 +74,7 @@ std::vector<LensGroup> LensGroups(const std::map<std::uint32_t, LensCamera>& cam
       return SameButForPrincipalPoint(cameras.at(ids.front()), camera);
     });
     if (found != alike.end()) {
-      found->push_back(id);
+      found->push_back(entry.first);
     } else {
       alike.push_back({entry.first});
     }

@@ -19,7 +19,7 @@ class RunFigures {
  private:
   void TimeUnlessTimed(double& ms, double& cpu_ms) const;
 
-  const Stopwatch started_;
+  const Stopwatch started_{};
   const double started_cpu_ms_ = ProcessCpuMilliseconds();
   AppReport report_;
 };

@@ -9,8 +9,9 @@
 #include "dtr/base/error.h"
 
 namespace dtr::pipeline {
-
+namespace {
 using Json = nlohmann::ordered_json;
+}  // namespace
 
 PruneJournal::PruneJournal(const std::filesystem::path& file) : file_(file) {
   std::uintmax_t whole = 0;
