@@ -181,21 +181,22 @@ void SayOsgTable(const OsgBench& bench, const eval::BenchMachine& machine, Conso
 }
 
 std::string OsgJson(const OsgBench& bench, const eval::BenchMachine& machine) {
-  using Json = nlohmann::ordered_json;
-  Json rows = Json::array();
+  using nlohmann::ordered_json;
+  ordered_json rows = ordered_json::array();
   double largest = 0;
   for (const OsgRow& row : bench.rows) {
-    Json json{{"path", row.read_back ? "read-back" : "gpu"},
-              {"method", row.options.method == RenderMethod::kTwoPass ? "two-pass" : "deferred"},
-              {"views_used", row.views_used},
-              {"resolution", row.options.resolution},
-              {"seconds_per_frame", row.osg.median_ms / 1000},
-              {"ms", row.osg.median_ms},
-              {"spread_ms", row.osg.spread_ms},
-              {"cpu_ms", row.osg_cpu.median_ms},
-              {"gl_ms", nullptr},
-              {"gl_cpu_ms", nullptr},
-              {"ratio_osg_over_gl", nullptr}};
+    ordered_json json{
+        {"path", row.read_back ? "read-back" : "gpu"},
+        {"method", row.options.method == RenderMethod::kTwoPass ? "two-pass" : "deferred"},
+        {"views_used", row.views_used},
+        {"resolution", row.options.resolution},
+        {"seconds_per_frame", row.osg.median_ms / 1000},
+        {"ms", row.osg.median_ms},
+        {"spread_ms", row.osg.spread_ms},
+        {"cpu_ms", row.osg_cpu.median_ms},
+        {"gl_ms", nullptr},
+        {"gl_cpu_ms", nullptr},
+        {"ratio_osg_over_gl", nullptr}};
     if (!row.read_back) {
       json["gl_ms"] = row.gl.median_ms;
       json["gl_cpu_ms"] = row.gl_cpu.median_ms;
@@ -204,18 +205,18 @@ std::string OsgJson(const OsgBench& bench, const eval::BenchMachine& machine) {
     }
     rows.push_back(json);
   }
-  return Json{{"table", "osg"},
-              {"width_px", bench.width_px},
-              {"height_px", bench.height_px},
-              {"frames", bench.frames},
-              {"rows", rows},
-              {"largest_ratio_osg_over_gl", largest},
-              {"machine",
-               {{"cpu", machine.cpu},
-                {"cores", machine.cores},
-                {"renderer", machine.renderer},
-                {"version", machine.version},
-                {"clock", machine.clock}}}}
+  return ordered_json{{"table", "osg"},
+                      {"width_px", bench.width_px},
+                      {"height_px", bench.height_px},
+                      {"frames", bench.frames},
+                      {"rows", rows},
+                      {"largest_ratio_osg_over_gl", largest},
+                      {"machine",
+                       {{"cpu", machine.cpu},
+                        {"cores", machine.cores},
+                        {"renderer", machine.renderer},
+                        {"version", machine.version},
+                        {"clock", machine.clock}}}}
       .dump(1);
 }
 

@@ -120,7 +120,8 @@ void RequireGiven(const RigPhotos& photos, const RigCalibrationOptions& options)
                       camera.name));
     }
   }
-  for (const auto& [name, lens] : options.given) {
+  for (const auto& given : options.given) {
+    const std::string& name = given.first;  // Clang 14 captures no structured binding
     if (std::none_of(photos.cameras.begin(), photos.cameras.end(),
                      [&](const auto& camera) { return camera.name == name; })) {
       throw UsageError(fmt::format("`camera` {}: no such camera; the first one is {}", name,

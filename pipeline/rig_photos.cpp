@@ -109,7 +109,9 @@ void LookAtAll(const calib::Board& board, const calib::DetectOptions& options, i
     }
     step();
   });
-  for (const auto& [video, wanted] : videos) {
+  for (const auto& entry : videos) {
+    const auto& video = entry.first;  // Clang 14 captures no structured binding
+    const auto& wanted = entry.second;
     std::vector<std::pair<size_t, ImageRgb8>> pending;
     const auto flush = [&] {
       ParallelFor(0, static_cast<int>(pending.size()), threads, [&](int k) {
@@ -135,7 +137,9 @@ void TakeOutRepeatedFrames(RigPhotos& photos) {
   for (const calib::RigView& view : photos.views) by_frame[view.frame].push_back(&view);
   std::vector<size_t> kept;
   std::map<size_t, size_t> repeats;  // frame -> the earlier one
-  for (const auto& [frame, views] : by_frame) {
+  for (const auto& entry : by_frame) {
+    const size_t frame = entry.first;
+    const auto& views = entry.second;  // as above
     const auto repeated = std::find_if(kept.begin(), kept.end(), [&](size_t earlier) {
       return std::all_of(views.begin(), views.end(), [&](const calib::RigView* view) {
         const auto& camera = photos.cameras[view->camera];

@@ -33,7 +33,8 @@ int MostBlended(const RenderResult& result) {
 /// The views of a scene in other orders: from another one on, backwards, and at random.
 std::vector<RenderScene> Reordered(const RenderScene& scene) {
   std::vector<RenderScene> orders(3, scene);
-  std::ranges::rotate(orders[0].views, orders[0].views.begin() + std::ssize(scene.views) / 3);
+  std::vector<const View*>& views = orders[0].views;
+  std::rotate(views.begin(), views.begin() + std::ssize(views) / 3, views.end());
   std::ranges::reverse(orders[1].views);
   Random random(6);
   for (size_t i = scene.views.size(); i > 1; --i) {

@@ -300,7 +300,8 @@ TEST(RenderSweep, OptionsOfAWeightAreTriedUnderThatWeightAlone) {
   EXPECT_EQ(others.blend_k, 1);
   EXPECT_DOUBLE_EQ(others.max_angle_rad, std::numbers::pi / 6);
   // Every one of them is measured alone.
-  for (const auto& [name, weights] : weights_of) {
+  for (const auto& entry : weights_of) {
+    const auto& name = entry.first;  // Clang 14 captures no structured binding
     const auto settings = OneAtATime(stage);
     EXPECT_EQ(std::ranges::count_if(
                   settings, [&](const SweepSetting& one) { return one[axis_of(name)] != 0; }),
