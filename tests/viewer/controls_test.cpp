@@ -79,7 +79,8 @@ class Controls : public MovingWindow {
 
   /// A slider towards both of its ends, of an option by this word.
   void Slide(const std::string& name, const std::string& word) {
-    Click(name, 0.35);  // of whole numbers, too, not where the slider begins
+    // Of whole numbers, too, not where the slider begins; 0.35 is the default of max-angle.
+    Click(name, 0.3);
     const Json low = Look(name, [&](const Json& s) { return Option(s, word).has_value(); });
     Click(name, 0.85);
     Look(name + " to the right", [&](const Json& s) {

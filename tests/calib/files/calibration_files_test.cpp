@@ -389,7 +389,8 @@ TEST(OpenCvYaml, FilesOfOtherProgramsAreReadOrNamed) {
   }
   for (const auto& [name, words] :
        {std::pair("kalibr-camchain.yaml", "Kalibr"), std::pair("orbslam.yaml", "ORB-SLAM")}) {
-    EXPECT_THAT([&] { ReadOpenCvYaml(folder / name); },
+    const auto file = folder / name;
+    EXPECT_THAT([&] { ReadOpenCvYaml(file); },
                 ::testing::ThrowsMessage<Error>(::testing::HasSubstr(words)));
   }
 }
