@@ -22,25 +22,13 @@ std::vector<std::string> WordsOf(VideoCoding coding) {
   // yuv420p, which every player knows, needs even sizes: an odd frame gains one row or column.
   // FFmpeg would code with BT.601's matrix and not say so, and players take BT.709's for HD. From
   // 7.1 on what frames say of their colours (setparams) counts, not the options behind.
-  return {"-vf",
-          "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv:flags=accurate_"
-          "rnd,setparams=color_primaries=bt709:color_trc=iec61966-2-1",
-          "-colorspace",
-          "bt709",
-          "-color_primaries",
-          "bt709",
-          "-color_trc",
-          "iec61966-2-1",
-          "-color_range",
-          "tv",
-          "-c:v",
-          "libx264",
-          "-crf",
-          "18",
-          "-pix_fmt",
-          "yuv420p",
-          "-movflags",
-          "+faststart"};
+  const std::string filter =
+      "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd,"
+      "setparams=color_primaries=bt709:color_trc=iec61966-2-1";
+  return {"-vf",     filter,       "-colorspace",  "bt709",        "-color_primaries",
+          "bt709",   "-color_trc", "iec61966-2-1", "-color_range", "tv",
+          "-c:v",    "libx264",    "-crf",         "18",           "-pix_fmt",
+          "yuv420p", "-movflags",  "+faststart"};
 }
 
 }  // namespace
