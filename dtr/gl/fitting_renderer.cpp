@@ -27,7 +27,7 @@ DrawnFrame InMemory(simd::DrawnImage drawn) {
 
 }  // namespace
 
-FittingRenderer::FittingRenderer(RendererSettings settings, Drawer drawer)
+FittingRenderer::FittingRenderer(const RendererSettings& settings, Drawer drawer)
     : open_gl_(settings),
       simd_({settings.gpu_bytes, settings.warn}),
       prefers_simd_(PrefersSimd(drawer)) {}

@@ -22,7 +22,7 @@ enum class Drawer {
 class FittingRenderer {
  public:
   /// Throws as gl::Renderer. `settings.gpu_bytes` holds for both.
-  explicit FittingRenderer(RendererSettings settings = {}, Drawer drawer = Drawer::kFitting);
+  explicit FittingRenderer(const RendererSettings& settings = {}, Drawer drawer = Drawer::kFitting);
 
   /// As gl::Renderer. `mapping`: images in memory get window_z, too.
   RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,

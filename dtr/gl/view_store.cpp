@@ -217,7 +217,7 @@ void ViewStore::PrepareDeferred(const std::vector<const View*>& views, const Ren
                              sizes, new_layers);
       }
     }
-    stored.deferred.emplace(key, std::move(deferred));
+    stored.deferred.emplace(key, deferred);
     grids[k] = {};
     depths[k] = {};
   }

@@ -104,7 +104,7 @@ std::vector<NovelCamera> Windows(std::vector<NovelCamera> cameras, int crop) {
   return cameras;
 }
 
-std::vector<Place> NovelPlaces(std::vector<NovelCamera> cameras) {
+std::vector<Place> NovelPlaces(const std::vector<NovelCamera>& cameras) {
   std::vector<Place> places;
   for (const NovelCamera& novel : cameras) places.push_back({novel, {}, {}, {}});
   return places;

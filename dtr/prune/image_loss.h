@@ -37,7 +37,7 @@ std::vector<Place> WitnessPlaces(const DtrSet& set, std::span<const Place> decid
 /// Of each camera a window of 1/crop of its image per axis, at another part each time.
 std::vector<NovelCamera> Windows(std::vector<NovelCamera> cameras, int crop);
 /// Places without photos.
-std::vector<Place> NovelPlaces(std::vector<NovelCamera> cameras);
+std::vector<Place> NovelPlaces(const std::vector<NovelCamera>& cameras);
 
 /// Images from the places, holes filled, without the source views in `without` and each place's
 /// own; `coverage`, unless null, becomes what of each some view saw.
