@@ -213,6 +213,13 @@ FocalPrior FocalFromExif(const io::ImageHeader& header) {
 Capture IngestPhotos(const fs::path& folder, const IngestOptions& options, Progress& progress) {
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
+    if (folder.extension() == ".r3d" && fs::exists(folder, error)) {
+      const std::string file = folder.string(), stem = folder.stem().string();
+      throw UsageError(fmt::format(
+          "{}: expected a folder of photos, found a recording of Record3D; unpack it (unzip {} -d "
+          "{}), give {}/rgbd, and the recording as `poses` and as `depth_prior`",
+          file, file, stem, stem));
+    }
     throw UsageError(folder.string() + ": expected a folder of photos, found " +
                      (fs::exists(folder, error) ? "something else" : "nothing"));
   }

@@ -45,11 +45,12 @@ void AddDepthOptions(CLI::App& command, const std::vector<std::string>& engines,
       ->type_name("DIR");
   CLI::Option* prior =
       command
-          .add_option("--depth-prior", choice.prior.folder,
-                      "Folder of depth maps of the photos, by a phone or a depth camera, of any "
-                      "resolution: they start --engine patchmatch, decide where the photos do not, "
-                      "and are the depth with --engine prior")
-          ->check(CLI::ExistingDirectory)
+          .add_option(
+              "--depth-prior", choice.prior.folder,
+              "Folder of depth maps of the photos, or capture, by a phone or a depth camera, "
+              "of any resolution: they start --engine patchmatch, decide where the photos do not, "
+              "and are the depth with --engine prior")
+          ->check(CLI::ExistingPath)
           ->type_name("DIR");
   command
       .add_option("--prior-unit", choice.prior.unit,

@@ -23,6 +23,8 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(aarch64|arm64)")
 endif()
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(ZSTD REQUIRED IMPORTED_TARGET libzstd>=1.4)
+# By pkg-config: libzip's own CMake files ask for its programs, which are other packages.
+pkg_check_modules(LIBZIP REQUIRED IMPORTED_TARGET libzip>=1.7)
 pkg_check_modules(FFMPEG REQUIRED IMPORTED_TARGET libavformat>=59 libavcodec>=59 libavfilter>=8
   libswscale>=6 libavutil>=57)  # FFmpeg 5.1
 pkg_check_modules(LCMS2 REQUIRED IMPORTED_TARGET lcms2>=2.12)

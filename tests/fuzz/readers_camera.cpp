@@ -6,6 +6,7 @@
 #include "dtr/base/files.h"
 #include "dtr/io/formats/foreign_depth.h"
 #include "dtr/io/formats/llff.h"
+#include "dtr/io/formats/lzfse.h"
 #include "dtr/io/formats/npy.h"
 #include "dtr/io/formats/pfm.h"
 #include "dtr/io/formats/rgbd_capture.h"
@@ -13,6 +14,7 @@
 #include "dtr/io/formats/transforms_json.h"
 #include "dtr/io/image_io.h"
 #include "tests/fuzz/readers.h"
+#include "tests/support/zip_file.h"
 
 namespace dtr::fuzz {
 namespace {
@@ -165,6 +167,42 @@ Reader OpenRecord3d(const fs::path& folder) {
   "poses": [[0, 0, 0, 1, 1, 2, 3]], "perFrameIntrinsicCoeffs": [[50, 50, 32, 24]]})"},
                      {});
 }
+// A recording with a map of stored bytes, of LZVN, and of long runs.
+Reader OpenR3d(const fs::path& folder) {
+  const fs::path file = folder / "scan.r3d", photo = folder / "photo.jpg";
+  io::WriteImage(photo, ImageRgb8(64, 48, 3, 90));
+  const std::string metadata = R"({"w": 64, "h": 48, "K": [50, 0, 0, 0, 50, 0, 32, 24, 1],
+  "poses": [[0, 0, 0, 1, 1, 2, 3]]})";
+  const std::string depth = testing::StoredAsLzfse(std::string(4 * 16 * 12, '\x40'));
+  testing::WriteZip(file, {{"metadata", metadata},
+                           {"rgbd/0.jpg", ReadFile(photo, kSeedLimitBytes)},
+                           {"rgbd/0.depth", depth}});
+  return {file,
+          {ReadFile(file, kSeedLimitBytes)},
+          [=] { io::ReadRgbdCapture(file, "record3d"); },
+          kImageBufferBytes};
+}
+// Streams of the reference encoder (tests/io/formats/lzfse_test.cpp), and stored bytes.
+Reader OpenLzfseDepth(const fs::path& folder) {
+  const fs::path file = folder / "0.depth";
+  std::vector<std::string> seeds = {testing::StoredAsLzfse(std::string(4 * 36 * 48, '\x40'))};
+  for (const char* name : {"depth", "depth_plain_header"}) {
+    seeds.push_back(ReadFile(std::string(DTR_LZFSE_STREAMS) + name + ".lzfse", kSeedLimitBytes));
+  }
+  return {file, std::move(seeds),
+          [=] { io::ReadDepthOfAnySize(file, DepthKind::kPlaneZ, 1, 72, 96); }};
+}
+// LZVN stands for other things than depth.
+Reader OpenLzfse(const fs::path& folder) {
+  const fs::path file = folder / "stream";
+  std::vector<std::string> seeds;
+  for (const char* name : {"text", "conf", "runs", "short"}) {
+    seeds.push_back(ReadFile(std::string(DTR_LZFSE_STREAMS) + name + ".lzfse", kSeedLimitBytes));
+  }
+  return {file, std::move(seeds), [=] {
+            io::DecodeLzfse(ReadFile(file, kSeedLimitBytes), kSeedLimitBytes, file.string());
+          }};
+}
 Reader OpenOdometry(const fs::path& folder) {
   return OpenCapture(
       folder, "stray-scanner", "rgb/000000.png", "odometry.csv",
@@ -222,6 +260,9 @@ constexpr ReaderKind kReaders[] = {
     {"matrix-text", OpenMatrixText},
     {"polycam", OpenPolycam},
     {"record3d", OpenRecord3d},
+    {"r3d", OpenR3d},
+    {"lzfse-depth", OpenLzfseDepth},
+    {"lzfse", OpenLzfse},
     {"odometry", OpenOdometry},
     {"camera-matrix", OpenCameraMatrix},
     {"trajectory", OpenTrajectory},

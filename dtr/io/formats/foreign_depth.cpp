@@ -1,15 +1,20 @@
 #include "dtr/io/formats/foreign_depth.h"
 
 #include <algorithm>
+#include <bit>
 #include <cctype>
 #include <cmath>
+#include <cstring>
 #include <string>
 #include <vector>
 
 #include "dtr/base/error.h"
+#include "dtr/base/files.h"
 #include "dtr/base/lower_case.h"
+#include "dtr/base/size_text.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/formats/cameras_json.h"
+#include "dtr/io/formats/lzfse.h"
 #include "dtr/io/formats/npy.h"
 #include "dtr/io/formats/pfm.h"
 #include "dtr/io/image_io.h"
@@ -47,8 +52,32 @@ Grid<float> FloatsFromNpy(const std::filesystem::path& file, std::uint64_t limit
   return numbers;
 }
 
-Grid<float> ReadNumbers(const std::filesystem::path& file, std::uint64_t limit_px) {
+// Record3D's: floats of phones (little-endian), row by row. The map has the photo's shape, which is
+// not in the file.
+Grid<float> FloatsFromLzfse(const std::filesystem::path& file, std::uint64_t limit_px, int width_px,
+                            int height_px) {
+  static_assert(std::endian::native == std::endian::little);
+  constexpr std::uintmax_t kFloat = sizeof(float);
+  const std::string bytes = DecodeLzfse(ReadFile(file, 2 * kFloat * limit_px + (1 << 16)),
+                                        kFloat * limit_px, file.string());
+  const size_t count = bytes.size() / kFloat;
+  const double aspect = static_cast<double>(width_px) / height_px;
+  const auto width =
+      static_cast<size_t>(std::lround(std::sqrt(aspect * static_cast<double>(count))));
+  if (width == 0 || bytes.size() % kFloat != 0 || count % width != 0) {
+    throw Error(file.string() + ": expected a depth map of the shape of its photo of " +
+                SizeText(width_px, height_px) + ", found " + std::to_string(count) +
+                " numbers; give the map of this photo");
+  }
+  Grid<float> numbers(static_cast<int>(width), static_cast<int>(count / width));
+  std::memcpy(numbers.data().data(), bytes.data(), bytes.size());
+  return numbers;
+}
+
+Grid<float> ReadNumbers(const std::filesystem::path& file, std::uint64_t limit_px, int width_px,
+                        int height_px) {
   const std::string extension = LowerExtension(file);
+  if (extension == ".depth") return FloatsFromLzfse(file, limit_px, width_px, height_px);
   if (extension == ".npy") return FloatsFromNpy(file, limit_px);
   if (extension == ".pfm") return ReadPfm(file);
   if (extension == ".png") return FloatsFromPng16(file, limit_px);
@@ -103,7 +132,7 @@ bool HoldsWholeNumbers(const std::filesystem::path& depth_file) {
 DepthImage ReadForeignDepth(const std::filesystem::path& file, DepthKind kind, double unit_scale,
                             int width_px, int height_px) {
   RequireUnit(file, unit_scale);
-  const Grid<float> numbers = ReadNumbers(file, PixelsOf(width_px, height_px));
+  const Grid<float> numbers = ReadNumbers(file, PixelsOf(width_px, height_px), width_px, height_px);
   if (!IsWholePart(numbers.width(), numbers.height(), width_px, height_px)) {
     throw Error(file.string() + ": expected a depth map of " + std::to_string(width_px) + "x" +
                 std::to_string(height_px) + " pixels or a whole part of it, found " +
@@ -118,7 +147,8 @@ DepthImage ReadDepthOfAnySize(const std::filesystem::path& file, DepthKind kind,
   constexpr std::uint64_t kMaxPerPixel = 16;  // four times finer than the photo per axis
   RequireUnit(file, unit_scale);
   const Grid<float> numbers =
-      ReadNumbers(file, std::min(kImageLimitPx, kMaxPerPixel * PixelsOf(width_px, height_px)));
+      ReadNumbers(file, std::min(kImageLimitPx, kMaxPerPixel * PixelsOf(width_px, height_px)),
+                  width_px, height_px);
   return Scaled(file, numbers, kind, unit_scale);
 }
 

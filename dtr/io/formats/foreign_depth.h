@@ -8,7 +8,8 @@ namespace dtr::io {
 
 /// Reads a depth map, by the file's extension: .exr, .tif, .tiff (float or half: the channel Z,
 /// else Y, else the first; a TIFF also of one channel of 16 bits), .pfm (one channel), .png (one
-/// channel of 16 bits) or .npy (one image of floats or integers: HxW, 1xHxW or HxWx1).
+/// channel of 16 bits), .npy (one image of floats or integers: HxW, 1xHxW or HxWx1) or .depth
+/// (Record3D's: LZFSE of floats, of the photo's shape).
 /// Each number is multiplied by `unit_scale` to give scene units (0.001 for millimetres in a set in
 /// metres) and measures what `kind` says; nothing guesses either. Numbers that are zero, negative,
 /// NaN or infinite, before or after scaling, are holes (programs write 0, -1, NaN or infinity), as

@@ -35,6 +35,12 @@ std::string PhotoCalled(const fs::path& folder, const std::string& stem) {
   return "";
 }
 
+std::string DepthCalled(const fs::path& folder, const std::string& stem, const char* extension) {
+  std::error_code ignored;
+  const std::string name = stem + extension;
+  return fs::is_regular_file(folder / name, ignored) ? name : "";
+}
+
 fs::path FolderOf(const fs::path& capture, std::initializer_list<const char*> names) {
   std::string all;
   for (const char* name : names) {
@@ -199,6 +205,7 @@ std::string RgbdFormatOf(const std::filesystem::path& capture) {
       return layout.name;
     }
   }
+  if (internal::IsUnpackedRecord3d(capture)) return "record3d";
   if (EndsLike(capture, ".pose.txt")) return "7scenes";
   if (std::filesystem::is_directory(capture / "depth", ignored) && EndsLike(capture, ".log")) {
     return "open3d";

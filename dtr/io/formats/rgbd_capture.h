@@ -2,11 +2,16 @@
 // out: photos, depth maps and poses in metres.
 #pragma once
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "dtr/io/formats/cameras_json.h"
+
+namespace dtr {
+class TemporaryFolder;
+}
 
 namespace dtr::io {
 
@@ -17,11 +22,14 @@ struct RgbdCapture {
   double depth_unit_m = 1;              ///< metres per number of a depth map; plane z
   std::vector<std::pair<std::string, std::string>> skipped;  ///< photos without a camera, and why
   std::vector<std::string> notes;                            ///< one line each
+  /// Where an archive is unpacked: `images` and `depth` last no longer than it.
+  std::shared_ptr<const TemporaryFolder> unpacked;
 };
 
 /// The layouts that are known:
 ///   polycam       keyframes/[corrected_]images, [corrected_]cameras/N.json, depth/N.png
-///   record3d      metadata.json, rgb/N.jpg, depth/N.exr ("EXR + RGB")
+///   record3d      metadata.json, rgb/N.jpg, depth/N.exr ("EXR + RGB"); a .r3d file, or what is in
+///                 one: metadata, rgbd/N.jpg, rgbd/N.depth
 ///   stray-scanner camera_matrix.csv, odometry.csv, depth/N.png, rgb/N.jpg (frames of rgb.mp4)
 ///   arkitscenes   lowres_wide.traj, lowres_wide/, lowres_wide_intrinsics/, lowres_depth/
 ///   scannet       color/, depth/, pose/, intrinsic/ (of its export program)

@@ -23,6 +23,8 @@ constexpr std::uintmax_t kMaxTextBytes = 64u << 20;
 std::vector<std::string> NamesIn(const fs::path& folder);
 /// STEM.jpg, .jpeg or .png (or capitals) in a folder; empty: there is none.
 std::string PhotoCalled(const fs::path& folder, const std::string& stem);
+/// The depth map STEM and `extension` in a folder; empty: there is none.
+std::string DepthCalled(const fs::path& folder, const std::string& stem, const char* extension);
 /// The first of these folders that exists; throws Error naming them all.
 fs::path FolderOf(const fs::path& capture, std::initializer_list<const char*> names);
 SizedImage SizedPhoto(const fs::path& folder, const std::string& name);
@@ -48,6 +50,8 @@ void AddFrame(const SizedImage& photo, const PinholeCamera& camera, const Pose& 
               const std::string& depth_file, RgbdCapture& capture);
 
 RgbdCapture ReadPolycam(const fs::path& folder, const fs::path& images);
+/// Whether it holds what a .r3d file does: `metadata` and rgbd/.
+bool IsUnpackedRecord3d(const fs::path& folder);
 RgbdCapture ReadRecord3d(const fs::path& folder, const fs::path& images);
 RgbdCapture ReadStrayScanner(const fs::path& folder, const fs::path& images);
 RgbdCapture ReadArkitScenes(const fs::path& folder, const fs::path& images);

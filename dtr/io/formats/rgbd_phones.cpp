@@ -16,12 +16,6 @@
 namespace dtr::io::internal {
 namespace {
 
-std::string DepthCalled(const fs::path& folder, const std::string& stem, const char* extension) {
-  std::error_code ignored;
-  const std::string name = stem + extension;
-  return fs::is_regular_file(folder / name, ignored) ? name : "";
-}
-
 void SayConfidence(const fs::path& folder, RgbdCapture& capture) {
   std::error_code ignored;
   if (!fs::is_directory(folder, ignored)) return;
@@ -85,84 +79,6 @@ RgbdCapture ReadPolycam(const fs::path& folder, const fs::path& images) {
              DepthCalled(capture.depth, stem, ".png"), capture);
   }
   SayConfidence(keyframes / "confidence", capture);
-  return capture;
-}
-
-namespace {
-
-std::vector<double> Numbers(const Json& json, size_t count, const std::string& where) {
-  if (!json.is_array() || json.size() != count) {
-    throw Error(fmt::format("{}: expected a list of {} numbers, found another", where, count));
-  }
-  std::vector<double> numbers;
-  for (const Json& number : json) numbers.push_back(NumberFrom(number, where));
-  return numbers;
-}
-
-Eigen::Matrix3d Record3dK(const Json& metadata, size_t frame, const std::string& where) {
-  Eigen::Matrix3d k = Eigen::Matrix3d::Identity();
-  if (metadata.contains("perFrameIntrinsicCoeffs")) {
-    const Json& all = metadata["perFrameIntrinsicCoeffs"];
-    if (all.is_array() && frame < all.size()) {
-      const auto own = Numbers(all[frame], 4, where + ": perFrameIntrinsicCoeffs");
-      k(0, 0) = own[0], k(1, 1) = own[1], k(0, 2) = own[2], k(1, 2) = own[3];
-      return k;
-    }
-  }
-  // Column by column.
-  const auto numbers = Numbers(Field(metadata, "K", where), 9, where + ": K");
-  for (int i = 0; i < 9; ++i) k(i % 3, i / 3) = numbers[static_cast<size_t>(i)];
-  return k;
-}
-
-/// The number that a file is called by; empty: it is none.
-std::optional<size_t> NumberOf(const std::string& stem) {
-  size_t number = 0;
-  const auto [end, error] = std::from_chars(stem.data(), stem.data() + stem.size(), number);
-  if (error != std::errc() || end != stem.data() + stem.size()) return std::nullopt;
-  return number;
-}
-
-}  // namespace
-
-// Record3D, "EXR + RGB": poses are (qx qy qz qw x y z), world_from_cam with ARKit's axes.
-RgbdCapture ReadRecord3d(const fs::path& folder, const fs::path& images) {
-  if (folder.extension() == ".r3d") {
-    throw Error(
-        folder.string() +
-        ": depth of .r3d files is LZFSE-compressed, which is not read; in Record3D share the "
-        "recording as \"EXR + RGB\" and give that folder");
-  }
-  const std::string where = (folder / "metadata.json").string();
-  const Json metadata = ParseJson(ReadFile(folder / "metadata.json", kMaxTextBytes), where);
-  RgbdCapture capture;
-  capture.images = images.empty() ? folder / "rgb" : images;
-  capture.depth = folder / "depth";
-  const int width = IntField(metadata, "w", 1, kMaxImageSidePx, where);
-  const int height = IntField(metadata, "h", 1, kMaxImageSidePx, where);
-  const Json& poses = Field(metadata, "poses", where);
-  if (!poses.is_array()) throw Error(where + ": poses: expected a list, found something else");
-  for (size_t frame = 0; frame < poses.size(); ++frame) {
-    const std::string stem = std::to_string(frame), at = fmt::format("{}: frame {}", where, frame);
-    const std::string photo_name = PhotoCalled(capture.images, stem);
-    if (photo_name.empty()) {
-      capture.skipped.emplace_back(stem, "no photo in " + capture.images.string());
-      continue;
-    }
-    const auto p = Numbers(poses[frame], 7, at + ": pose");
-    Eigen::Matrix4d pose = Eigen::Matrix4d::Identity();
-    pose.topLeftCorner<3, 3>() = Eigen::Quaterniond(p[3], p[0], p[1], p[2]).toRotationMatrix();
-    pose.topRightCorner<3, 1>() = Eigen::Vector3d(p[4], p[5], p[6]);
-    const SizedImage photo = SizedPhoto(capture.images, photo_name);
-    const PinholeCamera full =
-        CameraFromK(Record3dK(metadata, frame, where), width, height, PixelOrigin::kCorner, where);
-    AddFrame(photo, ScaledToImage(full, photo, at), PoseFromGl(pose, at),
-             DepthCalled(capture.depth, stem, ".exr"), capture);
-  }
-  for (const std::string& name : NamesIn(capture.images)) {
-    const auto number = NumberOf(fs::path(name).stem().string());
-    if (number && *number >= poses.size()) capture.skipped.emplace_back(name, "no pose");
-  }
   return capture;
 }
 

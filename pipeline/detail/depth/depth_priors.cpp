@@ -81,8 +81,9 @@ void RequireUnit(const std::filesystem::path& file, const DepthPriorChoice& choi
 }
 
 /// Where the folder is a capture: its maps by the file names of its photos; folder and unit of the
-/// choice become those of the maps.
-std::map<std::string, std::string> FilesOfCapture(DepthPriorChoice& choice) {
+/// choice become those of the maps. `unpacked` gets what they lie in where it is an archive.
+std::map<std::string, std::string> FilesOfCapture(
+    DepthPriorChoice& choice, std::shared_ptr<const TemporaryFolder>& unpacked) {
   const std::string format = io::RgbdFormatOf(choice.folder);
   if (format.empty()) return {};
   const io::RgbdCapture capture = io::ReadRgbdCapture(choice.folder, format);
@@ -92,6 +93,7 @@ std::map<std::string, std::string> FilesOfCapture(DepthPriorChoice& choice) {
     files[std::filesystem::path(camera.name).filename().string()] = camera.depth_file;
   }
   choice.folder = capture.depth;
+  unpacked = capture.unpacked;
   if (!choice.unit) choice.unit = capture.depth_unit_m;
   return files;
 }
@@ -109,8 +111,8 @@ ImportOptions OptionsOf(const DepthPriorChoice& choice) {
 DepthPriors::DepthPriors(const DepthPriorChoice& choice, std::span<const View* const> views,
                          std::span<const stereo::StereoView> sources, const SparseScene& scene,
                          LengthUnit unit, const PhotoCameras& photos, Progress& progress)
-    : choice_(choice) {
-  const std::map<std::string, std::string> named = FilesOfCapture(choice_);
+    : asked_(choice.folder), choice_(choice) {
+  const std::map<std::string, std::string> named = FilesOfCapture(choice_, unpacked_);
   const ImportOptions options = OptionsOf(choice_);
   for (const View* view : views) {
     io::NamedCamera camera;
@@ -133,7 +135,7 @@ DepthPriors::DepthPriors(const DepthPriorChoice& choice, std::span<const View* c
         "`depth_prior` {}: expected depth maps (.exr, .pfm, .png, .tif, .npy) named like the "
         "photos, "
         "as that of {}, found none; give the folder whose maps are named like the photos",
-        choice.folder.string(), cameras_.empty() ? "a photo" : cameras_.front().name));
+        asked_.string(), cameras_.empty() ? "a photo" : cameras_.front().name));
   }
   progress.Stage("depth prior", static_cast<int>(views.size()));
   int done = 0;
@@ -176,7 +178,7 @@ void DepthPriors::Say(const std::string& line, Progress& progress) {
 
 void DepthPriors::Validate(LengthUnit unit, Progress& progress) {
   const stereo::PriorAgreement& found = report_.agreement;
-  const std::string where = "`depth_prior` " + choice_.folder.string();
+  const std::string where = "`depth_prior` " + asked_.string();
   if (found.points < stereo::kMinPriorPointsInAll) {
     throw Error(fmt::format(
         "{}: cannot be checked against the photos, their points on its maps are {} and must be {}; "
@@ -265,7 +267,7 @@ void DepthPriors::CorrectScale(LengthUnit unit, Progress& progress) {
           fmt::format("`depth_prior` {}: its depth is {:.3f} times what the photos say, known to "
                       "{:.1f} % only: too "
                       "little to correct it by; give `prior_unit`, or maps of more photos",
-                      choice_.folder.string(), found.scale, Percent(found.scale_sigma)));
+                      asked_.string(), found.scale, Percent(found.scale_sigma)));
     }
     for (double& sigma : found.expected.sigma) sigma = std::hypot(sigma, off);
     return;
@@ -291,7 +293,7 @@ void DepthPriors::RequireOneScale() const {
       "at {:.3g} to {:.3g}, which no scale corrects; give depth, not disparity, and `prior_kind` "
       "ray "
       "where it is the distance from the camera",
-      choice_.folder.string(), Percent(bins.front().bias), bins.front().near_z, bins.front().far_z,
+      asked_.string(), Percent(bins.front().bias), bins.front().near_z, bins.front().far_z,
       Percent(bins.back().bias), bins.back().near_z, bins.back().far_z));
 }
 

@@ -14,6 +14,10 @@
 #include "stereo/depth_range.h"
 #include "stereo/engine.h"
 
+namespace dtr {
+class TemporaryFolder;
+}
+
 namespace dtr::pipeline {
 
 /// Cameras of the photos that views were undistorted from, by name of the photo: their pinhole
@@ -53,9 +57,11 @@ class DepthPriors {
   void CorrectScale(LengthUnit unit, Progress& progress);
   void RequireOneScale() const;
 
-  DepthPriorChoice choice_;
-  std::vector<io::NamedCamera> cameras_;  ///< of the photos
-  std::vector<PinholeCamera> grids_;      ///< of the views
+  std::filesystem::path asked_;                      ///< the folder or recording, for messages
+  DepthPriorChoice choice_;                          ///< its folder is that of the maps
+  std::shared_ptr<const TemporaryFolder> unpacked_;  ///< in which that is, where it was an archive
+  std::vector<io::NamedCamera> cameras_;             ///< of the photos
+  std::vector<PinholeCamera> grids_;                 ///< of the views
   std::vector<bool> has_map_;
   std::vector<stereo::DepthRange> ends_;  ///< of the maps as they are; 0: nothing measured
   std::vector<stereo::DepthPrior> priors_;

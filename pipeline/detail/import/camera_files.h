@@ -1,6 +1,7 @@
 // pipeline/detail/import/camera_files.h -- known cameras, whichever program wrote them.
 #pragma once
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -8,6 +9,10 @@
 
 #include "calib/sfm_model.h"
 #include "dtr/io/formats/cameras_json.h"
+
+namespace dtr {
+class TemporaryFolder;
+}
 
 namespace dtr::pipeline {
 
@@ -21,6 +26,8 @@ struct CamerasFromFile {
   std::filesystem::path mask_dir = {};
   /// Where images and depth maps of a capture lie; empty: the request says.
   std::filesystem::path images_dir = {}, depth_dir = {};
+  /// What these lie in where the capture is an archive: they last no longer than it.
+  std::shared_ptr<const TemporaryFolder> unpacked = {};
   /// Photos that the file says are for measuring; empty: it says nothing of that.
   std::optional<std::set<std::string>> held_out = {};
   std::optional<double> depth_unit = {};  ///< of depth maps that the file names

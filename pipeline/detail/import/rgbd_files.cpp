@@ -15,6 +15,7 @@ CamerasFromFile FromRgbdCapture(const std::filesystem::path& capture, const std:
   cameras.images_dir = std::move(read.images);
   cameras.depth_dir = std::move(read.depth);
   cameras.depth_unit = read.depth_unit_m;
+  cameras.unpacked = std::move(read.unpacked);
   cameras.skipped = std::move(read.skipped);
   cameras.notes = std::move(read.notes);
   return cameras;
