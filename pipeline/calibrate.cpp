@@ -175,7 +175,7 @@ int FeatureImageSizePx(const std::vector<std::pair<int, int>>& sizes_px, double 
 
 bool NeedsFeatures(const fs::path& poses, const std::string& poses_format) {
   return !IsColmapModel(poses, poses_format) ||
-         colmap::ReadModel(colmap::ModelFolderIn(poses)).points.empty();
+         !HasSharedPoints(colmap::ReadModel(colmap::ModelFolderIn(poses)));
 }
 
 void RequireCalibration(const fs::path& poses, const std::string& poses_format,

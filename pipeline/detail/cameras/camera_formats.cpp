@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 
 #include "calib/colmap/model_io.h"
 #include "dtr/base/error.h"
@@ -227,6 +228,26 @@ calib::SfmModel ReadGivenModel(const fs::path& folder) {
                               fmt::format("{}: camera {}", model_folder.string(), id));
   }
   return model;
+}
+
+bool HasSharedPoints(const calib::SfmModel& model) {
+  std::map<std::uint64_t, const calib::SfmImage*> seen_by;
+  for (const calib::SfmImage& image : model.images) {
+    for (const calib::SfmFeature& feature : image.features) {
+      if (!model.points.contains(feature.point_id)) continue;
+      const auto [seen, is_first] = seen_by.emplace(feature.point_id, &image);
+      if (!is_first && seen->second != &image) return true;
+    }
+  }
+  return false;
+}
+
+std::string LineOfUnsharedPoints(const calib::SfmModel& model, const std::string& source) {
+  if (model.points.empty() || HasSharedPoints(model)) return "";
+  return fmt::format(
+      "{}: none of its {} points is seen by two of the {} photos that are here, so none is used: "
+      "others are triangulated from the photos",
+      source, model.points.size(), model.images.size());
 }
 
 std::vector<fs::path> WithCompanions(const fs::path& file) {

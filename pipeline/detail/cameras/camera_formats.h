@@ -37,6 +37,13 @@ bool IsColmapModel(const std::filesystem::path& file, const std::string& name);
 /// images whose focal length no camera has.
 calib::SfmModel ReadGivenModel(const std::filesystem::path& folder);
 
+/// Whether two of its images see a point: others say nothing of where the scene is.
+bool HasSharedPoints(const calib::SfmModel& model);
+
+/// One line where it has points and none of them is shared, "" otherwise: such a model counts as
+/// one without points. `source`: its folder.
+std::string LineOfUnsharedPoints(const calib::SfmModel& model, const std::string& source);
+
 /// The file and those beside it that readers take in: lists of images, tracks.
 std::vector<std::filesystem::path> WithCompanions(const std::filesystem::path& file);
 

@@ -178,7 +178,9 @@ CalibratedPhotos FromModel(calib::SfmModel model, Given given, const capture::Ca
   const auto sources = std::count_if(model.images.begin(), model.images.end(), [&](const auto& i) {
     return !IsHeldOut(i.name, capture, options);
   });
-  if (model.points.empty() && sources >= 2) {
+  const std::string unshared = LineOfUnsharedPoints(model, options.poses.string());
+  if (!unshared.empty()) progress.Note(unshared);
+  if ((model.points.empty() || !unshared.empty()) && sources >= 2) {
     for (const calib::SfmImage& image : model.images) {
       given.by_name.emplace(
           image.name,

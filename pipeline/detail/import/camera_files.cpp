@@ -98,7 +98,11 @@ CamerasFromFile FromColmap(const fs::path& folder, const CameraFileFolders& fold
     cameras.list.cameras.push_back(named);
   }
   cameras.list.photo_grid = GridOfModel(model_folder);
-  if (!model.points.empty()) cameras.model = std::move(model);
+  if (std::string line = LineOfUnsharedPoints(model, model_folder.string()); !line.empty()) {
+    cameras.notes.push_back(std::move(line));
+  } else if (!model.points.empty()) {
+    cameras.model = std::move(model);
+  }
   return cameras;
 }
 
