@@ -10,7 +10,9 @@
 #include "calib/colmap/model_io.h"
 #include "calib/colmap/program.h"
 #include "calib/colmap/sfm.h"
+#include "calib/models/fisheye.h"
 #include "capture/contents_json.h"
+#include "capture/image_circle.h"
 #include "capture/sfm_images.h"
 #include "dtr/base/error.h"
 #include "dtr/types/panorama.h"
@@ -96,6 +98,16 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
                           calibrated.model, progress);
   }
   return calibrated;
+}
+
+// Photos of a fisheye that nobody said to be of one: a line before hours of work.
+void HintAtFisheye(const capture::Capture& capture, const CalibrateOptions& options,
+                   Progress& progress) {
+  const auto model = calib::CameraModelFromName(options.sfm.lens_model);
+  if (!options.poses.empty() || options.rig || options.lens || IsShared(options.part)) return;
+  if (model && calib::IsFisheye(*model)) return;
+  const std::string line = capture::LineOfImageCircle(capture.photos);
+  if (!line.empty()) progress.Note(line);
 }
 
 // Boards are looked at as their photos are stored (board_photos.h); turned upright a photo has its
@@ -198,6 +210,7 @@ CalibratedPhotos CalibratePhotos(const capture::Capture& capture, const Calibrat
   RequireCalibration(checked.poses, checked.poses_format, checked.sfm);
   if (checked.rig && !calib::HasOneCentre(checked.rig->known)) RejectTurned(capture, "the rig is");
   if (checked.lens) RejectTurned(capture, "the intrinsics are");
+  HintAtFisheye(capture, checked, progress);
   fs::create_directories(workspace);
   CalibratedPhotos calibrated = checked.poses.empty()
                                     ? FromSfm(capture, checked, workspace, progress)
