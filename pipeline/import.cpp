@@ -190,6 +190,7 @@ ImportOptions OptionsFor(const ImportRequest& request, CamerasFromFile& cameras,
   ImportOptions options;
   options.images_dir = request.images;
   options.depth_dir = request.depth;
+  if (request.depth == cameras.depth_dir) options.confidence = cameras.confidence;
   options.mask_dir = FindMasks(request, cameras, progress);
   options.depth_kind = request.depth_kind;
   options.depth_unit = DepthUnit(request, cameras, progress);

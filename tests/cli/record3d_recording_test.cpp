@@ -39,15 +39,29 @@ class Record3dRecording : public ::testing::Test {
   static std::string File() { return (*shared_ / "scan.r3d").string(); }
   std::string In(const std::string& name) const { return (folder_ / name).string(); }
 
-  /// The middle one of each map's pixels.
-  static std::string DepthOf(const std::string& stem) {
-    const DepthImage truth =
-        io::ReadForeignDepth(Courtyard() / "depth" / (stem + ".exr"), DepthKind::kPlaneZ, 1,
-                             kCourtyardWidthPx, kCourtyardHeightPx);
+  /// The middle one of each map's pixels; too far by a fifth, and of no confidence, in the left
+  /// upper quarter.
+  static bool IsUnsure(int x, int y, const DepthImage& truth) {
+    return 2 * x < truth.width() && 2 * y < truth.height();
+  }
+  static std::string ConfidenceOf(const DepthImage& truth) {
+    std::string levels;
+    for (int y = kShrink / 2; y < truth.height(); y += kShrink) {
+      for (int x = kShrink / 2; x < truth.width(); x += kShrink) {
+        levels += IsUnsure(x, y, truth) ? '\0' : '\2';
+      }
+    }
+    return StoredAsLzfse(levels);
+  }
+  static DepthImage TruthOf(const std::string& stem) {
+    return io::ReadForeignDepth(Courtyard() / "depth" / (stem + ".exr"), DepthKind::kPlaneZ, 1,
+                                kCourtyardWidthPx, kCourtyardHeightPx);
+  }
+  static std::string DepthOf(const DepthImage& truth) {
     std::string bytes;
     for (int y = kShrink / 2; y < truth.height(); y += kShrink) {
       for (int x = kShrink / 2; x < truth.width(); x += kShrink) {
-        const float z = truth(x, y);
+        const float z = truth(x, y) * (IsUnsure(x, y, truth) ? 1.2f : 1.0f);
         char raw[sizeof z];
         std::memcpy(raw, &z, sizeof z);
         bytes.append(raw, sizeof raw);
@@ -72,7 +86,8 @@ class Record3dRecording : public ::testing::Test {
       const std::string stem = fs::path(named.name).stem().string();
       const std::string name = "rgbd/" + std::to_string(frame++);
       entries.emplace_back(name + ".jpg", ReadFile(Courtyard() / "images" / named.name, kMaxBytes));
-      entries.emplace_back(name + ".depth", DepthOf(stem));
+      entries.emplace_back(name + ".depth", DepthOf(TruthOf(stem)));
+      entries.emplace_back(name + ".conf", ConfidenceOf(TruthOf(stem)));
     }
     const Json metadata = {{"w", kCourtyardWidthPx},
                            {"h", kCourtyardHeightPx},
@@ -90,9 +105,7 @@ class Record3dRecording : public ::testing::Test {
     for (const View& view : set.frames[0].views) {
       const auto frame = static_cast<size_t>(std::stoi(view.name));
       const std::string stem = fs::path(list.cameras[frame].name).stem().string();
-      const DepthImage truth =
-          io::ReadForeignDepth(Courtyard() / "depth" / (stem + ".exr"), DepthKind::kPlaneZ, 1,
-                               kCourtyardWidthPx, kCourtyardHeightPx);
+      const DepthImage truth = TruthOf(stem);
       const int s = kCourtyardWidthPx / view.depth.width();
       for (int y = 0; y < view.depth.height(); ++y) {
         for (int x = 0; x < view.depth.width(); ++x) {
@@ -130,6 +143,10 @@ TEST_F(Record3dRecording, BecomesASetAsItIs) {
   EXPECT_EQ(set.unit, LengthUnit::kMetre);
   constexpr double kCoded = 1e-4;  // 16 bits of inverse depth; the maps' pixels are exact
   EXPECT_LT(MedianErrorOf(set), kCoded);
+  for (const View& view : set.frames[0].views) {
+    EXPECT_TRUE(DepthImage::IsHole(view.depth(3, 3))) << "of the lowest confidence";
+    EXPECT_FALSE(DepthImage::IsHole(view.depth(3, view.depth.height() - 3)));
+  }
 }
 
 TEST_F(Record3dRecording, GivesCamerasAndAPriorToItsPhotos) {
@@ -142,6 +159,7 @@ TEST_F(Record3dRecording, GivesCamerasAndAPriorToItsPhotos) {
   }
   const Ran ran = DtrOk({"build", photos.string(), "--poses", File(), "--depth-prior", File(),
                          "--preset", "fast", "-o", In("scene.dtr"), "--json", "-"});
+  EXPECT_THAT(ran.err, HasSubstr("depth of the lowest confidence is left out, 25.0 % of the"));
   const Json prior = Json::parse(ran.out).at("depth_prior");
   EXPECT_EQ(prior.at("maps"), 4);
   EXPECT_NEAR(prior.at("scale").get<double>(), 1, 0.01);

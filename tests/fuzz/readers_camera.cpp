@@ -192,6 +192,14 @@ Reader OpenLzfseDepth(const fs::path& folder) {
   return {file, std::move(seeds),
           [=] { io::ReadDepthOfAnySize(file, DepthKind::kPlaneZ, 1, 72, 96); }};
 }
+Reader OpenConfidence(const fs::path& folder) {
+  const fs::path file = folder / "0.conf";
+  return {file, {ReadFile(std::string(DTR_LZFSE_STREAMS) + "conf.lzfse", kSeedLimitBytes)}, [=] {
+            DepthImage depth(36, 48, DepthKind::kPlaneZ);
+            io::LowConfidenceShare(file);
+            io::LeaveOutLowConfidence(file, depth);
+          }};
+}
 // LZVN stands for other things than depth.
 Reader OpenLzfse(const fs::path& folder) {
   const fs::path file = folder / "stream";
@@ -263,6 +271,7 @@ constexpr ReaderKind kReaders[] = {
     {"r3d", OpenR3d},
     {"lzfse-depth", OpenLzfseDepth},
     {"lzfse", OpenLzfse},
+    {"confidence", OpenConfidence},
     {"odometry", OpenOdometry},
     {"camera-matrix", OpenCameraMatrix},
     {"trajectory", OpenTrajectory},

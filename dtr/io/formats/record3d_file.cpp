@@ -46,7 +46,7 @@ Archive Opened(const fs::path& file) {
   return archive;
 }
 
-/// metadata, rgbd/N.jpg or rgbd/N.depth: what is unpacked, and under no other name.
+/// metadata, rgbd/N.jpg, rgbd/N.depth or rgbd/N.conf: what is unpacked, and under no other name.
 bool IsOfACapture(const std::string& name) {
   if (name == "metadata") return true;
   if (!name.starts_with("rgbd/")) return false;
@@ -54,7 +54,8 @@ bool IsOfACapture(const std::string& name) {
   const bool numbered = end != std::string::npos && end > begin && end - begin <= 9 &&
                         std::all_of(name.begin() + begin, name.begin() + static_cast<long>(end),
                                     [](char c) { return c >= '0' && c <= '9'; });
-  return numbered && (name.substr(end) == ".jpg" || name.substr(end) == ".depth");
+  const std::string extension = name.substr(std::min(end, name.size()));
+  return numbered && (extension == ".jpg" || extension == ".depth" || extension == ".conf");
 }
 
 /// An entry that holds more than its directory says is not written to its end.

@@ -41,6 +41,11 @@ std::string DepthCalled(const fs::path& folder, const std::string& stem, const c
   return fs::is_regular_file(folder / name, ignored) ? name : "";
 }
 
+void TakeConfidence(const fs::path& folder, const char* extension, RgbdCapture& capture) {
+  std::error_code ignored;
+  if (fs::is_directory(folder, ignored)) capture.confidence = {folder, extension};
+}
+
 fs::path FolderOf(const fs::path& capture, std::initializer_list<const char*> names) {
   std::string all;
   for (const char* name : names) {
@@ -125,6 +130,35 @@ void AddFrame(const SizedImage& photo, const PinholeCamera& camera, const Pose& 
 
 namespace {
 
+/// Reads all confidence maps and says what they leave out. Such that leave nothing over say
+/// nothing, and are not used.
+void CheckConfidence(const fs::path& folder, RgbdCapture& capture) {
+  double low = 0;
+  int maps = 0;
+  for (const NamedCamera& camera : capture.list.cameras) {
+    if (camera.depth_file.empty()) continue;
+    const fs::path file = capture.confidence.FileOf(camera.depth_file);
+    if (file.empty()) continue;
+    low += LowConfidenceShare(file);
+    ++maps;
+  }
+  if (maps == 0) {
+    capture.confidence = {};
+    return;
+  }
+  const double share = low / maps;
+  if (share == 1) {
+    capture.notes.push_back(folder.string() +
+                            ": its confidence maps are 0 throughout, and are not used");
+    capture.confidence = {};
+    return;
+  }
+  capture.confidence_line = fmt::format(
+      "{}: depth of the lowest confidence is left out, {:.1f} % of the pixels of {} maps",
+      folder.string(), 100 * share, maps);
+  capture.notes.push_back(capture.confidence_line);
+}
+
 /// What all layouts are checked for once they are read.
 void Check(const fs::path& folder, RgbdCapture& capture) {
   capture.list.unit = LengthUnit::kMetre;
@@ -146,6 +180,7 @@ void Check(const fs::path& folder, RgbdCapture& capture) {
     capture.notes.push_back(
         fmt::format("{}: {} of {} photos have no depth map", folder.string(), without, cameras));
   }
+  CheckConfidence(folder, capture);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dtr/io/formats/cameras_json.h"
+#include "dtr/io/formats/foreign_confidence.h"
 
 namespace dtr {
 class TemporaryFolder;
@@ -20,6 +21,8 @@ struct RgbdCapture {
   CameraList list;                      ///< unit metre; depth files where there are any
   std::filesystem::path images, depth;  ///< folders that the list's names are relative to
   double depth_unit_m = 1;              ///< metres per number of a depth map; plane z
+  ConfidenceMaps confidence;            ///< of the depth maps
+  std::string confidence_line;          ///< what they leave out, one of `notes`; "": there are none
   std::vector<std::pair<std::string, std::string>> skipped;  ///< photos without a camera, and why
   std::vector<std::string> notes;                            ///< one line each
   /// Where an archive is unpacked: `images` and `depth` last no longer than it.

@@ -25,6 +25,8 @@ std::vector<std::string> NamesIn(const fs::path& folder);
 std::string PhotoCalled(const fs::path& folder, const std::string& stem);
 /// The depth map STEM and `extension` in a folder; empty: there is none.
 std::string DepthCalled(const fs::path& folder, const std::string& stem, const char* extension);
+/// Says that the capture has confidence maps where the folder exists.
+void TakeConfidence(const fs::path& folder, const char* extension, RgbdCapture& capture);
 /// The first of these folders that exists; throws Error naming them all.
 fs::path FolderOf(const fs::path& capture, std::initializer_list<const char*> names);
 SizedImage SizedPhoto(const fs::path& folder, const std::string& name);

@@ -16,14 +16,6 @@
 namespace dtr::io::internal {
 namespace {
 
-void SayConfidence(const fs::path& folder, RgbdCapture& capture) {
-  std::error_code ignored;
-  if (!fs::is_directory(folder, ignored)) return;
-  capture.notes.push_back(folder.string() +
-                          ": confidence maps are not used; how far depth agrees with the photos is "
-                          "measured where it is a prior of stereo");
-}
-
 Eigen::Matrix4d PolycamPose(const Json& json, const std::string& where) {
   Eigen::Matrix4d pose = Eigen::Matrix4d::Identity();
   for (int row = 0; row < 3; ++row) {
@@ -78,7 +70,7 @@ RgbdCapture ReadPolycam(const fs::path& folder, const fs::path& images) {
              PoseFromGl(PolycamPose(json, file.string()), file.string()),
              DepthCalled(capture.depth, stem, ".png"), capture);
   }
-  SayConfidence(keyframes / "confidence", capture);
+  TakeConfidence(keyframes / "confidence", ".png", capture);
   return capture;
 }
 
@@ -153,7 +145,7 @@ RgbdCapture ReadStrayScanner(const fs::path& folder, const fs::path& images) {
              PoseFrom(turn, {value("x"), value("y"), value("z")}, where + ": frame " + stem),
              DepthCalled(capture.depth, stem, ".png"), capture);
   });
-  SayConfidence(folder / "confidence", capture);
+  TakeConfidence(folder / "confidence", ".png", capture);
   return capture;
 }
 
@@ -220,7 +212,7 @@ RgbdCapture ReadArkitScenes(const fs::path& folder, const fs::path& images) {
                            photo, pincam.string()),
              *pose, DepthCalled(capture.depth, stem, ".png"), capture);
   }
-  SayConfidence(folder / "confidence", capture);
+  TakeConfidence(folder / "confidence", ".png", capture);
   return capture;
 }
 

@@ -1,7 +1,7 @@
 // Record3D: https://github.com/marek-simonik/record3d. Its two exports say the same: "EXR + RGB"
 // (metadata.json, rgb/N.jpg, depth/N.exr) and .r3d, a ZIP archive (metadata, rgbd/N.jpg, and
-// rgbd/N.depth: LZFSE of floats, metres, row by row). Poses are (qx qy qz qw x y z),
-// world_from_cam with ARKit's axes.
+// rgbd/N.depth: LZFSE of floats, metres, row by row; rgbd/N.conf of LiDAR: LZFSE of bytes). Poses
+// are (qx qy qz qw x y z), world_from_cam with ARKit's axes.
 #include <fmt/format.h>
 
 #include <charconv>
@@ -20,9 +20,10 @@ namespace {
 /// Where one of the exports has its parts.
 struct Record3dLayout {
   const char *metadata, *photos, *depth, *depth_extension;
+  const char* confidence_extension;  ///< beside the depth maps; null: it has none
 };
-constexpr Record3dLayout kExrExport = {"metadata.json", "rgb", "depth", ".exr"};
-constexpr Record3dLayout kR3d = {"metadata", "rgbd", "rgbd", ".depth"};
+constexpr Record3dLayout kExrExport = {"metadata.json", "rgb", "depth", ".exr", nullptr};
+constexpr Record3dLayout kR3d = {"metadata", "rgbd", "rgbd", ".depth", ".conf"};
 
 std::vector<double> Numbers(const Json& json, size_t count, const std::string& where) {
   if (!json.is_array() || json.size() != count) {
@@ -99,6 +100,9 @@ RgbdCapture ReadLayout(const Record3dLayout& layout, const fs::path& folder, con
              DepthCalled(capture.depth, stem, layout.depth_extension), capture);
   }
   ListWithoutPose(poses.size(), capture);
+  if (layout.confidence_extension != nullptr) {
+    TakeConfidence(capture.depth, layout.confidence_extension, capture);
+  }
   return capture;
 }
 

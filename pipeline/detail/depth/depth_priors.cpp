@@ -80,27 +80,33 @@ void RequireUnit(const std::filesystem::path& file, const DepthPriorChoice& choi
       "0.001 for millimetres in a set in metres");
 }
 
-/// Where the folder is a capture: its maps by the file names of its photos; folder and unit of the
-/// choice become those of the maps. `unpacked` gets what they lie in where it is an archive.
-std::map<std::string, std::string> FilesOfCapture(
-    DepthPriorChoice& choice, std::shared_ptr<const TemporaryFolder>& unpacked) {
+/// What a capture has of its photos.
+struct MapsOfCapture {
+  std::map<std::string, std::string> files;  ///< by the file names of the photos
+  io::ConfidenceMaps confidence;
+  std::string confidence_line;
+  std::shared_ptr<const TemporaryFolder> unpacked;
+};
+
+/// Where the folder is a capture: its maps; folder and unit of the choice become theirs.
+MapsOfCapture TakeCapture(DepthPriorChoice& choice) {
   const std::string format = io::RgbdFormatOf(choice.folder);
   if (format.empty()) return {};
   const io::RgbdCapture capture = io::ReadRgbdCapture(choice.folder, format);
-  std::map<std::string, std::string> files;
+  MapsOfCapture maps{{}, capture.confidence, capture.confidence_line, capture.unpacked};
   for (const io::NamedCamera& camera : capture.list.cameras) {
     if (camera.depth_file.empty()) continue;
-    files[std::filesystem::path(camera.name).filename().string()] = camera.depth_file;
+    maps.files[std::filesystem::path(camera.name).filename().string()] = camera.depth_file;
   }
   choice.folder = capture.depth;
-  unpacked = capture.unpacked;
   if (!choice.unit) choice.unit = capture.depth_unit_m;
-  return files;
+  return maps;
 }
 
-ImportOptions OptionsOf(const DepthPriorChoice& choice) {
+ImportOptions OptionsOf(const DepthPriorChoice& choice, const io::ConfidenceMaps& confidence) {
   ImportOptions options;
   options.depth_dir = choice.folder;
+  options.confidence = confidence;
   options.depth_kind = choice.kind;
   options.depth_unit = choice.unit;
   return options;
@@ -112,8 +118,12 @@ DepthPriors::DepthPriors(const DepthPriorChoice& choice, std::span<const View* c
                          std::span<const stereo::StereoView> sources, const SparseScene& scene,
                          LengthUnit unit, const PhotoCameras& photos, Progress& progress)
     : asked_(choice.folder), choice_(choice) {
-  const std::map<std::string, std::string> named = FilesOfCapture(choice_, unpacked_);
-  const ImportOptions options = OptionsOf(choice_);
+  MapsOfCapture maps_of_capture = TakeCapture(choice_);
+  const std::map<std::string, std::string>& named = maps_of_capture.files;
+  confidence_ = std::move(maps_of_capture.confidence);
+  unpacked_ = std::move(maps_of_capture.unpacked);
+  if (!maps_of_capture.confidence_line.empty()) Say(maps_of_capture.confidence_line, progress);
+  const ImportOptions options = OptionsOf(choice_, confidence_);
   for (const View* view : views) {
     io::NamedCamera camera;
     camera.name = view->name;
@@ -164,7 +174,8 @@ DepthImage DepthPriors::Load(size_t source) const {
   std::unique_ptr<CameraDistortion> distortion;
   if (camera.distortion) distortion = DistortionOf(camera);
   std::string resampled;
-  DepthImage depth = ReadCameraDepth(camera, OptionsOf(choice_), distortion.get(), resampled);
+  DepthImage depth =
+      ReadCameraDepth(camera, OptionsOf(choice_, confidence_), distortion.get(), resampled);
   if (depth.width() > grids_[source].width_px()) depth = OnGrid(depth, grids_[source]);
   if (report_.divided_by == 1) return depth;
   for (float& z : depth.grid().data()) z = static_cast<float>(z / report_.divided_by);

@@ -8,6 +8,7 @@
 
 #include "dtr/base/progress.h"
 #include "dtr/io/formats/cameras_json.h"
+#include "dtr/io/formats/foreign_confidence.h"
 #include "dtr/types/dtr_set.h"
 #include "dtr/types/sparse_scene.h"
 #include "pipeline/depth_prior.h"
@@ -59,6 +60,7 @@ class DepthPriors {
 
   std::filesystem::path asked_;                      ///< the folder or recording, for messages
   DepthPriorChoice choice_;                          ///< its folder is that of the maps
+  io::ConfidenceMaps confidence_;                    ///< of these
   std::shared_ptr<const TemporaryFolder> unpacked_;  ///< in which that is, where it was an archive
   std::vector<io::NamedCamera> cameras_;             ///< of the photos
   std::vector<PinholeCamera> grids_;                 ///< of the views

@@ -9,6 +9,7 @@
 
 #include "calib/sfm_model.h"
 #include "dtr/io/formats/cameras_json.h"
+#include "dtr/io/formats/foreign_confidence.h"
 
 namespace dtr {
 class TemporaryFolder;
@@ -26,6 +27,7 @@ struct CamerasFromFile {
   std::filesystem::path mask_dir = {};
   /// Where images and depth maps of a capture lie; empty: the request says.
   std::filesystem::path images_dir = {}, depth_dir = {};
+  io::ConfidenceMaps confidence = {};  ///< of the maps in depth_dir
   /// What these lie in where the capture is an archive: they last no longer than it.
   std::shared_ptr<const TemporaryFolder> unpacked = {};
   /// Photos that the file says are for measuring; empty: it says nothing of that.

@@ -6,6 +6,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/size_text.h"
 #include "dtr/io/formats/depth_grid.h"
+#include "dtr/io/formats/foreign_confidence.h"
 #include "dtr/io/formats/foreign_depth.h"
 
 namespace dtr::pipeline {
@@ -78,6 +79,9 @@ DepthImage ReadCameraDepth(const io::NamedCamera& named, const ImportOptions& op
   const DepthKind kind = options.depth_kind.value_or(named.depth_kind);
   DepthImage depth =
       io::ReadDepthOfAnySize(file, kind, options.depth_unit.value_or(1.0), width_px, height_px);
+  if (const fs::path confidence = options.confidence.FileOf(file); !confidence.empty()) {
+    io::LeaveOutLowConfidence(confidence, depth);
+  }
   const auto scale = io::DepthScaleFor(depth.width(), depth.height(), width_px, height_px);
   if (!scale) {
     throw Error(file.string() + ": a depth map of " + SizeText(depth.width(), depth.height()) +

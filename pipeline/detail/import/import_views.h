@@ -10,6 +10,7 @@
 
 #include "dtr/base/progress.h"
 #include "dtr/io/formats/cameras_json.h"
+#include "dtr/io/formats/foreign_confidence.h"
 #include "dtr/io/image_io.h"
 #include "dtr/types/sparse_scene.h"
 #include "dtr/types/view.h"
@@ -34,6 +35,7 @@ class CameraDistortion {
 struct ImportOptions {
   std::filesystem::path images_dir;
   std::filesystem::path depth_dir;  ///< empty: views stay without depth, for `dtr stereo`
+  io::ConfidenceMaps confidence;    ///< of these depth maps
   std::filesystem::path mask_dir;   ///< empty: a folder `masks` beside images_dir
   /// What the depth numbers measure; empty: what the list says for each camera.
   std::optional<DepthKind> depth_kind;

@@ -14,6 +14,7 @@ CamerasFromFile FromRgbdCapture(const std::filesystem::path& capture, const std:
   cameras.list.photo_grid = PhotoGrid::kStored;
   cameras.images_dir = std::move(read.images);
   cameras.depth_dir = std::move(read.depth);
+  cameras.confidence = std::move(read.confidence);
   cameras.depth_unit = read.depth_unit_m;
   cameras.unpacked = std::move(read.unpacked);
   cameras.skipped = std::move(read.skipped);

@@ -201,7 +201,7 @@ TEST_F(Record3dFile, NothingButAFramesFilesIsUnpacked) {
   for (const auto& entry : fs::recursive_directory_iterator(capture.images.parent_path())) {
     files += entry.is_regular_file();
   }
-  EXPECT_EQ(files, 7u) << "metadata, three photos, three depth maps";
+  EXPECT_EQ(files, 10u) << "metadata, three photos, three depth maps, three of confidence";
 }
 
 TEST_F(Record3dFile, FilesThatGrowBeyondWhatTheArchiveCanHoldAreRejected) {
@@ -209,6 +209,50 @@ TEST_F(Record3dFile, FilesThatGrowBeyondWhatTheArchiveCanHoldAreRejected) {
   entries.emplace_back("rgbd/8.jpg", std::string(80 << 20, '\0'));
   testing::WriteZip(file(), entries, true);
   EXPECT_THAT(ErrorOf(), HasSubstr("rgbd/8.jpg of too many bytes"));
+}
+
+// Confidence as ARKit has it: 0, 1 and 2.
+TEST_F(Record3dFile, DepthOfTheLowestConfidenceIsLeftOut) {
+  std::string levels(300, '\2');
+  levels[1] = 0, levels[2] = 1;
+  ZipEntries entries = Recording(Metadata(), Photo());
+  for (auto& [name, bytes] : entries) {
+    if (name == "rgbd/1.conf") bytes = testing::StoredAsLzfse(levels);
+  }
+  testing::WriteZip(file(), entries);
+  const RgbdCapture capture = ReadRgbdCapture(file(), "record3d");
+  EXPECT_EQ(capture.confidence_line,
+            file().string() +
+                ": depth of the lowest confidence is left out, 0.1 % of the pixels of 3 maps");
+  EXPECT_THAT(capture.notes, Contains(capture.confidence_line));
+  DepthImage depth = ReadDepthOfAnySize(capture.depth / "1.depth", DepthKind::kPlaneZ, 1, 80, 60);
+  LeaveOutLowConfidence(capture.confidence.FileOf("1.depth"), depth);
+  EXPECT_TRUE(DepthImage::IsHole(depth(1, 0)));
+  EXPECT_FLOAT_EQ(depth(2, 0), 1.02f);
+  EXPECT_FLOAT_EQ(depth(3, 2), 1.43f);
+}
+
+TEST_F(Record3dFile, ConfidenceThatLeavesNothingOrIsAbsentIsNotUsed) {
+  ZipEntries entries = Recording(Metadata(), Photo());
+  for (auto& [name, bytes] : entries) {
+    if (name.ends_with(".conf")) bytes = testing::StoredAsLzfse(std::string(300, '\0'));
+  }
+  testing::WriteZip(file(), entries);
+  const RgbdCapture capture = ReadRgbdCapture(file(), "record3d");
+  EXPECT_THAT(capture.notes, Contains(HasSubstr("its confidence maps are 0 throughout")));
+  EXPECT_TRUE(capture.confidence.FileOf("1.depth").empty());
+  std::erase_if(entries, [](const auto& entry) { return entry.first.ends_with(".conf"); });
+  testing::WriteZip(file(), entries);
+  EXPECT_EQ(ReadRgbdCapture(file(), "record3d").confidence_line, "");
+}
+
+TEST_F(Record3dFile, ConfidenceOfAnotherSizeOrCutShortIsAnError) {
+  Write(root() / "0.conf", testing::StoredAsLzfse(std::string(299, '\2')));
+  DepthImage depth(20, 15, DepthKind::kPlaneZ);
+  EXPECT_THAT(testing::MessageOf<Error>([&] { LeaveOutLowConfidence(root() / "0.conf", depth); }),
+              HasSubstr("expected a confidence map of the depth map's 20x15 pixels, found 299"));
+  testing::ExpectEveryPrefixIsAnError(root() / "0.conf", 7,
+                                      [&] { LowConfidenceShare(root() / "0.conf"); });
 }
 
 class Record3dDepth : public ::testing::Test {

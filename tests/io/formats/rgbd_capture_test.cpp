@@ -11,6 +11,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/io/depth_io.h"
+#include "dtr/io/formats/foreign_depth.h"
 #include "dtr/io/image_io.h"
 #include "tests/io/formats/small_capture.h"
 #include "tests/support/test_data.h"
@@ -143,12 +144,34 @@ TEST_F(Rgbd, StrayScanner) {
   for (size_t i = 0; i < 3; ++i) WritePhoto(root() / "rgb" / fmt::format("{:06}.jpg", 5 * i));
   const RgbdCapture capture = ReadRgbdCapture(root(), "stray-scanner");
   ExpectCameras(capture, 0.5);
+  EXPECT_EQ(capture.confidence_line, "");
   EXPECT_EQ(capture.list.cameras[1].depth_file, "000005.png");
   ExpectCutsNoticed(root(), root() / "odometry.csv", "stray-scanner");
   ExpectCutsNoticed(root(), root() / "camera_matrix.csv", "stray-scanner");
   // Intrinsics of the video beside photos of another size that is not a scaled one.
   Write(root() / "camera_matrix.csv", "1400,0,900\n0,1400,100\n0,0,1\n");
   EXPECT_THAT(ErrorOf(root(), "stray-scanner"), HasSubstr("is not near the middle"));
+}
+
+// Levels are numbers and no colours: 0, 1 and 2 of 255.
+TEST_F(Rgbd, ConfidenceOfStrayScannerIsReadAsItIsStored) {
+  WriteDepthMm(root() / "depth/000000.png");
+  WritePhoto(root() / "rgb/000000.jpg");
+  Write(root() / "odometry.csv", "timestamp,frame,x,y,z,qx,qy,qz,qw\n0,000000,0,0,0,0,0,0,1\n");
+  Write(root() / "camera_matrix.csv", "70,0,40\n0,70,30\n0,0,1\n");
+  ImageRgb8 levels(20, 15, 3, 2);
+  for (int c = 0; c < 3; ++c) levels(4, 3, c) = 0, levels(5, 3, c) = 1;
+  fs::create_directories(root() / "confidence");
+  WriteImage(root() / "confidence/000000.png", levels);
+  const RgbdCapture capture = ReadRgbdCapture(root(), "stray-scanner");
+  EXPECT_THAT(capture.confidence_line, HasSubstr("left out, 0.3 % of the pixels of 1 maps"));
+  DepthImage depth =
+      ReadDepthOfAnySize(capture.depth / "000000.png", DepthKind::kPlaneZ, 0.001, 80, 60);
+  LeaveOutLowConfidence(capture.confidence.FileOf("000000.png"), depth);
+  EXPECT_TRUE(DepthImage::IsHole(depth(4, 3)));
+  EXPECT_FLOAT_EQ(depth(5, 3), 2.5f);
+  WriteImage(root() / "confidence/000000.png", ImageRgb8(15, 20, 3, 2));
+  EXPECT_THROW(LeaveOutLowConfidence(capture.confidence.FileOf("000000.png"), depth), Error);
 }
 
 TEST_F(Rgbd, StrayScannerPhotosMayBeShrunk) {
