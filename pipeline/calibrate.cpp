@@ -66,7 +66,7 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
   colmap::SfmResult sfm =
       colmap::RunSfm(workspace / "photos", inputs, workspace / "sfm", sfm_options, progress);
   if (panoramas) {
-    CompletePanoramas(capture, *options.rig, inputs, workspace, sfm_options, sfm, progress);
+    CompletePanoramas(photos, *options.rig, inputs, workspace, sfm_options, sfm, progress);
   }
   PhotoRefinement refined = RefineSfm({.capture = capture,
                                        .options = options,
@@ -95,7 +95,7 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
   calibrated.unit = refined.unit;
   if (options.strict) {
     RegisterHeldOutPhotos(Subset(capture, options.held_out), inputs, groups, workspace, sfm_options,
-                          calibrated.model, progress);
+                          panoramas ? &*options.rig : nullptr, calibrated.model, progress);
   }
   return calibrated;
 }

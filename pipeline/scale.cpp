@@ -21,10 +21,11 @@
 #include "dtr/render/stored_options_json.h"
 #include "pipeline/detail/boards/scale_board.h"
 #include "pipeline/detail/pages/set_page.h"
+#include "pipeline/detail/photos/panorama_positions.h"
 #include "pipeline/detail/reports/metres_json.h"
 #include "pipeline/detail/run/finishing.h"
 #include "pipeline/detail/run/run_log.h"
-#include "pipeline/photo_positions.h"
+#include "pipeline/set_rig.h"
 #include "pipeline/validate.h"
 
 namespace dtr::pipeline {
@@ -68,7 +69,7 @@ Found FromDistances(const ScaleOptions& options, const DtrSet& set) {
   return found;
 }
 
-Found FromGps(const ScaleOptions& options, const DtrSet& set) {
+Found FromGps(const ScaleOptions& options, const DtrSet& set, Progress& progress) {
   Found found;
   std::map<std::string, Eigen::Vector3d> centre_of;
   std::vector<std::string> names;
@@ -76,7 +77,10 @@ Found FromGps(const ScaleOptions& options, const DtrSet& set) {
     names.push_back(view.name);
     centre_of[view.name] = view.CenterInWorld();
   }
-  const PhotoPositions located = ReadPhotoPositions(options.gps, names);
+  const std::optional<SetRig> rig = RigOfSet(set);
+  const PhotoPositions located = rig && calib::HasOneCentre(rig->known)
+                                     ? ReadPanoramaPositions(options.gps, names, progress)
+                                     : ReadPhotoPositions(options.gps, names);
   RequirePlaces(located, options.gps.string(), "the set");
   std::vector<std::string>& lines = found.report.lines;
   lines = located.without_place;
@@ -135,7 +139,7 @@ Found FromBoard(const ScaleOptions& options, const DtrSet& set, Progress& progre
 Found FindScale(const ScaleOptions& options, const DtrSet& set, Progress& progress) {
   Found found = options.board         ? FromBoard(options, set, progress)
                 : options.gps.empty() ? FromDistances(options, set)
-                                      : FromGps(options, set);
+                                      : FromGps(options, set, progress);
   found.report.metres_per_unit = found.metric_from_scene.scale;
   return found;
 }

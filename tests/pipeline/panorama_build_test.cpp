@@ -12,6 +12,8 @@
 #include "dtr/io/set_io.h"
 #include "pipeline/build.h"
 #include "pipeline/capture.h"
+#include "pipeline/scale.h"
+#include "tests/cli/gps_photo.h"
 #include "tests/pipeline/dataset_once.h"
 #include "tests/support/message_of.h"
 #include "tests/support/noted_lines.h"
@@ -28,6 +30,9 @@ using ::testing::HasSubstr;
 constexpr int kPanoramas = 6;
 // Measured with 36 views of 244 px: 0.0004 m and 0.0003 rad; four times that.
 constexpr double kMaxCentreError = 0.0016, kMaxTurnRad = 0.001;
+// Of a panorama whose views are found one by one by points that others have: of 244 px each.
+constexpr double kMaxRegisteredCentreError = 0.02, kMaxRegisteredTurnRad = 0.01;
+constexpr double kMetresPerTrueUnit = 20;  // so that the digits of EXIF are enough
 
 class PanoramaBuild : public dtr::testing::DatasetOnce {
  protected:
@@ -45,6 +50,18 @@ class PanoramaBuild : public dtr::testing::DatasetOnce {
     return options;
   }
 };
+
+// Photos called as the panoramas, with the places of their centres in EXIF, 20 times as far apart.
+void WriteLocated(const std::map<std::string, Pose>& true_pose, const fs::path& folder) {
+  fs::create_directories(folder);
+  Eigen::Vector3d corner = true_pose.begin()->second.TargetOriginInSource();
+  for (const auto& [name, pose] : true_pose) corner = corner.cwiseMin(pose.TargetOriginInSource());
+  for (const auto& [name, pose] : true_pose) {
+    if (!name.starts_with("front/")) continue;
+    dtr::testing::WritePhotoAt(folder / fs::path(name).filename(),
+                               kMetresPerTrueUnit * (pose.TargetOriginInSource() - corner));
+  }
+}
 
 TEST_F(PanoramaBuild, ViewsOfAPanoramaStandInOnePointWhereTheyAre) {
   BuildOptions options = Options("set");
@@ -94,6 +111,56 @@ TEST_F(PanoramaBuild, ViewsOfAPanoramaStandInOnePointWhereTheyAre) {
   EXPECT_EQ(provenance["calibration"]["rig"]["frames"], kPanoramas);
 }
 
+// A panorama that structure from motion never saw stands where it is, as one; and the set, in the
+// unit of nobody, becomes metres by what its panoramas say of their places.
+TEST_F(PanoramaBuild, AStrictlyHeldOutPanoramaStandsAsOneAndPlacesGiveMetres) {
+  BuildOptions options = Options("strict");
+  options.holdout = "0002";
+  options.holdout_strict = true;
+  SilentProgress silent;
+  BuildSet(options, silent);
+  const DtrSet set = io::ReadSet(options.output);
+  std::map<std::string, Pose> true_pose;
+  for (const auto& camera : io::ReadCamerasJson(*folder_ / "walk/cameras.json").cameras) {
+    true_pose[camera.name] = camera.cam_from_world;
+  }
+  std::vector<Eigen::Vector3d> found, expected;
+  std::map<std::string, const View*> first_of;
+  for (const View& view : set.frames.front().views) {
+    const std::string panorama = fs::path(view.name).stem();
+    EXPECT_EQ(view.role == ViewRole::kHeldOut, panorama == "0002") << view.name;
+    const auto [entry, fresh] = first_of.emplace(panorama, &view);
+    EXPECT_LT((view.CenterInWorld() - entry->second->CenterInWorld()).norm(), 1e-9) << view.name;
+    if (!fresh || panorama == "0002") continue;
+    found.push_back(view.CenterInWorld());
+    expected.push_back(true_pose.at(view.name).TargetOriginInSource());
+  }
+  ASSERT_TRUE(first_of.contains("0002"));
+  const calib::Similarity truth_from_set = calib::AlignPoints(found, expected);
+  int held_out = 0;
+  for (const View& view : set.frames.front().views) {
+    if (view.role != ViewRole::kHeldOut) continue;
+    ++held_out;
+    const Pose& pose = true_pose.at(view.name);
+    const Pose aligned = truth_from_set.CamFromB(view.cam_from_world);
+    EXPECT_LT((aligned.TargetOriginInSource() - pose.TargetOriginInSource()).norm(),
+              kMaxRegisteredCentreError);
+    EXPECT_LT(aligned.rotation.angularDistance(pose.rotation), kMaxRegisteredTurnRad);
+  }
+  EXPECT_GE(held_out, 3);
+
+  const fs::path located = *folder_ / "located";
+  WriteLocated(true_pose, located);
+  ScaleOptions scale;
+  scale.set = options.output;
+  scale.output = *folder_ / "metres.dtr";
+  scale.gps = located;
+  const ScaleReport report = ScaleSet(scale, silent);
+  EXPECT_NEAR(report.metres_per_unit / (kMetresPerTrueUnit * truth_from_set.scale), 1, 0.01);
+  ASSERT_TRUE(report.positions);
+  EXPECT_EQ(report.positions->photos, static_cast<size_t>(kPanoramas)) << "one place a panorama";
+}
+
 TEST_F(PanoramaBuild, ACaptureOfPanoramasKeepsWhatItsViewsAre) {
   SilentProgress silent;
   const capture::Capture views = Ingest(
@@ -124,9 +191,12 @@ TEST_F(PanoramaBuild, WhatDoesNotGoWithPanoramasIsRejectedBeforeAnyWork) {
   options.sfm.camera_per = CameraPer::kPhoto;
   EXPECT_THAT(message(options), HasSubstr("leave out `camera_per`"));
   options = Options("no");
-  options.holdout = "every:3";
-  options.holdout_strict = true;
-  EXPECT_THAT(message(options), HasSubstr("`holdout_strict` does not go with them"));
+  options.metres.gps = true;
+  EXPECT_THAT(message(options), HasSubstr("leave out `gps` and `distance`; dtr calibrate scale "
+                                          "takes the finished set"));
+  options = Options("no");
+  options.sfm.engine = colmap::SfmEngine::kColmap;
+  EXPECT_THAT(message(options), HasSubstr("COLMAP 3.8 cannot hold one; use `sfm` auto or global"));
 }
 
 }  // namespace

@@ -357,17 +357,38 @@ CalibratedPhotos WithPointsOfFile(calib::SfmModel model, const capture::Capture&
   return calibrated;
 }
 
+namespace {
+
+// Views of one panorama, found one by one, as the panorama stands. `points`: those they observe.
+void StandAsPanoramas(const SetRig& panoramas, const capture::Capture& held_out,
+                      const std::map<std::uint64_t, calib::SfmPoint>& points,
+                      colmap::HeldOutResult& placed) {
+  const auto photo_of = PhotosOfRig(panoramas, held_out);
+  calib::SfmModel found;
+  found.cameras = placed.cameras;
+  found.images = placed.images;
+  found.points = points;
+  const auto poses = calib::RigPosesOf(found, panoramas.known, photo_of);
+  for (calib::SfmImage& image : placed.images) {
+    const calib::RigPhoto& photo = photo_of.at(image.name);
+    image.cam_from_world = panoramas.known.cam_from_rig[photo.camera] * poses.at(photo.frame);
+  }
+}
+
+}  // namespace
+
 void RegisterHeldOutPhotos(const capture::Capture& held_out,
                            const std::vector<colmap::SfmImageInput>& sources,
                            const CameraGroups& groups, const fs::path& workspace,
-                           const colmap::SfmOptions& options, calib::SfmModel& model,
-                           Progress& progress) {
+                           const colmap::SfmOptions& options, const SetRig* panoramas,
+                           calib::SfmModel& model, Progress& progress) {
   if (held_out.photos.empty()) return;
   capture::PrepareSfmImages(held_out, workspace / "photos", 0, options.threads, options.memory_gb,
                             progress);
-  const colmap::HeldOutResult placed = colmap::RegisterHeldOut(
+  colmap::HeldOutResult placed = colmap::RegisterHeldOut(
       workspace / "photos", SfmInputs(held_out, groups, workspace / "photos"), model, sources,
       workspace / "sfm", workspace / "held_out", options, progress);
+  if (panoramas != nullptr) StandAsPanoramas(*panoramas, held_out, model.points, placed);
   for (const calib::SfmImage& image : placed.images) {
     // The pose alone: what the photo shows of the points would enter the set outside held_out/.
     AddImage({0, image.name, 0, image.cam_from_world, {}}, placed.cameras.at(image.camera_id),

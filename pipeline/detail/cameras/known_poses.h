@@ -61,11 +61,13 @@ CalibratedPhotos FromKnownPoses(const capture::Capture& capture, const Calibrate
                                 const std::filesystem::path& workspace, Progress& progress);
 
 /// Adds the poses of held-out photos to a model that was made without them. Nothing else of the
-/// model changes; photos that cannot be registered are left out.
+/// model changes; photos that cannot be registered are left out. `panoramas`: the rig that all
+/// photos are views of, or null: then all views of a panorama stand as it says, where most of them
+/// were found to be.
 void RegisterHeldOutPhotos(const capture::Capture& held_out,
                            const std::vector<colmap::SfmImageInput>& sources,
                            const CameraGroups& groups, const std::filesystem::path& workspace,
-                           const colmap::SfmOptions& options, calib::SfmModel& model,
-                           Progress& progress);
+                           const colmap::SfmOptions& options, const SetRig* panoramas,
+                           calib::SfmModel& model, Progress& progress);
 
 }  // namespace dtr::pipeline

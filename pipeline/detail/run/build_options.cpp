@@ -75,10 +75,10 @@ void RequirePanoramaOptions(const BuildOptions& options) {
   reject(!options.rig.empty(), "leave out `rig`");
   reject(!options.refine, "leave out `no_refine`");
   reject(options.sfm.camera_per != CameraPer::kAuto, "leave out `camera_per`");
-  reject(options.metres.any(),
-         "`gps` and `distance` do not go with them; dtr calibrate scale takes the finished set");
-  reject(options.holdout_strict,
-         "`holdout_strict` does not go with them; `holdout` holds out whole panoramas");
+  reject(
+      options.metres.any(),
+      "leave out `gps` and `distance`; dtr calibrate scale takes the finished set, with the folder "
+      "of the panoramas or with distances");
   reject(options.sfm.engine == colmap::SfmEngine::kColmap,
          "COLMAP 3.8 cannot hold one; use `sfm` auto or global");
 }
