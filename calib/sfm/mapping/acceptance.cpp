@@ -20,8 +20,10 @@ constexpr int kStrongMatches = 30;  // a pair that verification did not find by 
 constexpr double kMaxMedianPx = 1.5, kMaxRmsPx = 2.5;  // of 1000 px
 constexpr double kMaxRotationMisfit = 1.5;             // median; 1 is what the certainties promise
 constexpr double kMinFocal = 0.35, kMaxFocal = 12;     // of the long side: 110 and 5 degrees
+constexpr double kWideFocal = 0.4;                     // 14 mm of film; few lenses that are none
 constexpr double kMinFisheyeFocal = 0.15;              // a circle of 190 degrees in half of it
-constexpr double kMaxFocalChange = 1.35;               // where it was known
+constexpr char kFisheyeHint[] = " (a fisheye? then `lens_model` RADIAL_FISHEYE)";
+constexpr double kMaxFocalChange = 1.35;  // where it was known
 constexpr double kAgreePx = 6, kContradictedBelow = 0.4;
 constexpr double kMaxContradicted = 0.05, kMaxContradictedOfImage = 0.4;
 constexpr double kKnownAngleRad = 0.017;  // 1 degree
@@ -49,15 +51,14 @@ std::string WhyNotFocal(const MapEvidence& evidence) {
     if (!(f > least * side && f < kMaxFocal * side)) {
       return fmt::format(
           "the focal length of camera {} became {:.0f} px, {:.2f} times the long side{}", c + 1, f,
-          f / side,
-          f <= least * side && !fisheye ? " (a fisheye? then `lens_model` RADIAL_FISHEYE)" : "");
+          f / side, f <= least * side && !fisheye ? kFisheyeHint : "");
     }
     const double before = evidence.graph.cameras[c].params[0];
     const double change = std::max(f / before, before / f);
     if (evidence.graph.focal_is_known[c] && change > kMaxFocalChange) {
       return fmt::format(
-          "the focal length of camera {} became {:.0f} px, but was known as {:.0f} px", c + 1, f,
-          before);
+          "the focal length of camera {} became {:.0f} px, but was known as {:.0f} px{}", c + 1, f,
+          before, before <= kWideFocal * side && !fisheye ? kFisheyeHint : "");
     }
     const auto images =
         std::count_if(evidence.graph.images.begin(), evidence.graph.images.end(),
