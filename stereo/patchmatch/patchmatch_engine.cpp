@@ -138,7 +138,8 @@ State SearchPyramid(const StereoView& view, std::span<const GreyImage> pictures,
   State state;
   Level level, coarser;
   int round = 0;
-  for (size_t index = pictures.size(); index-- > 0; coarser = std::move(level)) {
+  // From the coarsest of at least one; left at the finest.
+  for (size_t index = pictures.size() - 1;; --index, coarser = std::move(level)) {
     const std::uint64_t seed = HashOf(options.seed, index);
     level = MakeLevel(view, pictures[index], sources, index, range, seed);
     expect(index, &level);
