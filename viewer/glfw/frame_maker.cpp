@@ -39,11 +39,11 @@ PinholeCamera Smaller(const PinholeCamera& camera, int divisor) {
 
 }  // namespace
 
-FrameMaker::FrameMaker(ViewStream& stream, ViewColours colours, gl::RendererSettings settings,
-                       gl::Drawer drawer, SigmaOf sigma_of)
+FrameMaker::FrameMaker(ViewStream& stream, ViewColours colours,
+                       const gl::RendererSettings& settings, gl::Drawer drawer, SigmaOf sigma_of)
     : stream_(stream),
       colours_(std::move(colours)),
-      renderer_(std::move(settings), drawer),
+      renderer_(settings, drawer),
       sigma_of_(std::move(sigma_of)) {}
 
 ImageRgb8 FrameMaker::InFalseColour() {

@@ -53,7 +53,7 @@ struct MadeFrame {
 class FrameMaker {
  public:
   /// The stream must outlive it.
-  FrameMaker(ViewStream& stream, ViewColours colours, gl::RendererSettings settings,
+  FrameMaker(ViewStream& stream, ViewColours colours, const gl::RendererSettings& settings,
              gl::Drawer drawer, SigmaOf sigma_of);
 
   const ViewColours& colours() const { return colours_; }
