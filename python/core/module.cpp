@@ -68,6 +68,16 @@ py::object FloatsOf(const SetView& view, Plane plane) {
   return ViewOf(pixels);
 }
 
+/// Of a held-out view: holes, which take no memory.
+py::object DepthOf(const SetView& view) {
+  const py::object depth = FloatsOf(view, Plane::kDepth);
+  if (!depth.is_none() || view.view().role != ViewRole::kHeldOut) return depth;
+  const PinholeCamera camera = view.view().DepthCamera();
+  const py::module_ numpy = py::module_::import("numpy");
+  return numpy.attr("broadcast_to")(numpy.attr("float32")(0),
+                                    py::make_tuple(camera.height_px(), camera.width_px()));
+}
+
 std::uintptr_t AddressOf(const SetView& view, const std::string& plane) {
   OpenSet& set = view.set->open;
   const auto address = [](const auto& grid) {
@@ -298,10 +308,11 @@ void AddView(py::module_& module) {
           "mask", [](const SetView& v) { return BytesOf(v, Plane::kMask); },
           "(height, width) uint8, 255 where a pixel is usable; None: all are.")
       .def_property_readonly(
-          "depth", [](const SetView& v) { return FloatsOf(v, Plane::kDepth); },
+          "depth", &DepthOf,
           "(height, width) float32, plane z in the camera's frame, scene units, as measured; 0 is "
           "a\n"
-          "hole. None for a view without depth. May be a whole fraction of the image's size.")
+          "hole: all of a held-out view. None where the set has no depth. May be a whole fraction "
+          "of the image's size.")
       .def_property_readonly(
           "completed_depth", [](const SetView& v) { return FloatsOf(v, Plane::kCompletedDepth); },
           "As depth, of the pixels where none was measured and renderers draw a likely surface; 0\n"

@@ -52,7 +52,7 @@ def _depth(depth: Any, what: str, image: npt.NDArray[np.uint8]) -> Optional[npt.
         raise _fail(
             f"{what}: expected finite depths from 0 (a hole) on, found {array[y, x]} at x {x}, y {y}"
         )
-    return narrow
+    return narrow if narrow.any() else None  # as held-out views of a set are read
 
 
 def _matrices(values: Any, count: int, shapes: Sequence[tuple[int, int]], what: str) -> Any:
@@ -165,7 +165,8 @@ def from_arrays(
 
     images: N of shape (height, width, 3), uint8, sRGB, undistorted. depths: N of shape (height,
     width), floats, plane z in the camera's frame (not the distance), scene units, 0 for a hole; of
-    the images' sizes or a whole fraction of them; None for a view that is held out, to measure with.
+    the images' sizes or a whole fraction of them; None, or holes alone, for a view that is held out,
+    to measure with.
     K: (3, 3), or one for each image, pixels with the origin at the outer corner of the top-left
     pixel (from OpenCV: add 0.5 to cx and cy). poses: (N, 4, 4) or (N, 3, 4), cam_from_world: p_cam = R p_world + t, camera
     axes x right, y down, z forward. names: of the views, default '0000', '0001', ... unit:

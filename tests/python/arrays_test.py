@@ -48,9 +48,9 @@ class RoundTrip(WithSet):
                                 [v.K for v in views], [v.cam_from_world for v in views],
                                 world_origin=s.world_origin, unit=s.unit).save(self.folder / "again.dtr")
         for a, b in zip(views, again.views):
+            self.assertEqual(a.role, b.role)
             np.testing.assert_array_equal(a.image, b.image)
-            if a.depth is not None:
-                np.testing.assert_allclose(a.depth, b.depth, rtol=1e-4)
+            np.testing.assert_allclose(a.depth, b.depth, rtol=1e-4)
 
     def test_options_of_import(self):
         told = []
@@ -65,6 +65,9 @@ class RoundTrip(WithSet):
         made = dtr.from_arrays(images, depths, K, poses)
         s = made.save(self.folder / "without.dtr")
         self.assertEqual([v.role for v in s.views], ["source", "source", "held_out", "source"])
+        depths[2] = np.zeros_like(depths[1])  # as a held-out view of a set is read
+        holes = dtr.from_arrays(images, depths, K, poses).save(self.folder / "holes.dtr")
+        self.assertEqual([v.role for v in holes.views], [v.role for v in s.views])
         with self.assertRaisesRegex(dtr.UsageError, "`holdout`: views without depth, as 0002"):
             made.save(self.folder / "never.dtr", holdout="every:2")
 

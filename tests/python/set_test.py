@@ -99,11 +99,15 @@ class Arrays(WithSet):
         # The export takes each depth through 1/z in float, which costs an ulp.
         np.testing.assert_allclose(measured, exported, rtol=2e-7)
 
-    def test_held_out_views_have_no_depth(self):
+    def test_held_out_views_have_nothing_but_holes(self):
         held_out = [v for v in dtr.load(self.path).views if v.role == "held_out"]
         self.assertEqual(len(held_out), 2)
-        self.assertIsNone(held_out[0].depth)
-        self.assertEqual(held_out[0].image.ndim, 3)
+        depth = held_out[0].depth
+        self.assertEqual(depth.shape, held_out[0].image.shape[:2])
+        self.assertEqual(depth.dtype, np.float32)
+        self.assertFalse(depth.any())
+        self.assertFalse(depth.flags.writeable)
+        self.assertIsNone(held_out[0].completed_depth)
 
     def test_outlive_the_set(self):
         s = dtr.load(self.path)
