@@ -18,8 +18,9 @@ static_assert(sizeof(ViewBlock) == 11 * 16, "std430: eleven vec4");
 constexpr int kMaxImageArrays = StateGuard::kTextureUnits - 1;
 // Variants of the resolving shader hold so many views, doubled until all fit.
 constexpr int kMinViews = 8;
-constexpr int kGroupPx = 8;                                    // a side of a group
-constexpr GLuint kViewsBinding = 0, kResolveDepthBinding = 2;  // as in resolve.comp
+// As in resolve.comp: pixels of a side of a group, bindings.
+constexpr int kGroupPx = 8;
+constexpr GLuint kViewsBinding = 0, kResolveDepthBinding = 2;
 
 std::array<float, 4> Row(const Eigen::Vector3d& row, double last) {
   return {static_cast<float>(row.x()), static_cast<float>(row.y()), static_cast<float>(row.z()),

@@ -7,7 +7,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
-#include <optional>
 #include <vector>
 
 #include "dtr/eval/timed_renderer.h"

@@ -217,11 +217,13 @@ TEST_F(RunSfmWithFake, AModelOfPhotosMostlyWithoutParallaxIsRemarkedOn) {
   EXPECT_EQ(Run().report.lack_of_parallax, "");
 }
 
-// The mapper makes a model with fixed intrinsics only.
-constexpr char kOnlyFixed[] =
-    "if ! tail -n 1 \"$here/calls\" | grep -q 'ba_refine_focal_length 0.*ba_refine_extra_params "
-    "0'; "
-    "then echo 'ERROR: failed to create sparse model'; exit 1; fi";
+// What the mapper does with free intrinsics; with fixed ones it makes its model.
+std::string UnlessFixed(const std::string& commands) {
+  return "if ! tail -n 1 \"$here/calls\" | grep -q 'ba_refine_focal_length 0.*"
+         "ba_refine_extra_params 0'; then " +
+         commands + "; fi";
+}
+const std::string kOnlyFixed = UnlessFixed("echo 'ERROR: failed to create sparse model'; exit 1");
 
 TEST_F(RunSfmWithFake, WithoutAModelTheFocalLengthsOfExifAreFixed) {
   fake_.Fail("mapper", kOnlyFixed);
@@ -233,11 +235,9 @@ TEST_F(RunSfmWithFake, WithoutAModelTheFocalLengthsOfExifAreFixed) {
   EXPECT_THAT(listener_.notes, Contains(HasSubstr("trying with those of EXIF, fixed")));
 }
 
-// The mapper leaves the two photos that it began with; with fixed intrinsics it goes on.
-constexpr char kTwoPhotosUnlessFixed[] =
-    "if ! tail -n 1 \"$here/calls\" | grep -q 'ba_refine_focal_length 0.*ba_refine_extra_params "
-    "0'; "
-    "then cp -r \"$here/model.0\" \"$output/0\"; exit 0; fi";
+// The mapper leaves the two photos that it began with.
+const std::string kTwoPhotosUnlessFixed =
+    UnlessFixed("cp -r \"$here/model.0\" \"$output/0\"; exit 0");
 
 TEST_F(RunSfmWithFake, AModelOfTheFirstTwoPhotosAloneIsAsGoodAsNone) {
   fake_.Fail("mapper", kTwoPhotosUnlessFixed);
