@@ -5,6 +5,7 @@
 #include <system_error>
 #include <utility>
 
+#include "dtr/base/delete.h"
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/lower_case.h"
@@ -71,10 +72,8 @@ void PreparePhoto(const Photo& photo, const fs::path& to, int max_size_px) {
                                   (header.channels == 1 || header.channels == 3);
   const bool unchanged = readable_by_colmap && photo.exif_orientation == 1 &&
                          size == std::pair(photo.width_px, photo.height_px);
-  std::error_code error;
   MakeFolderOf(to);
-  fs::remove(to, error);
-  RequireDone(error, to);
+  RemoveFile(to);
   if (unchanged) {
     LinkOrCopy(photo.file, to);
   } else {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "capture/capture_json.h"
+#include "dtr/base/delete.h"
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -102,7 +103,7 @@ void CaptureWriter::State::Recover() const {
   }
   if (!fs::exists(folder / mark) || !fs::exists(folder / kCaptureFile)) return;
   const FileLock nobody_at_work = WorkFolder::Lock(folder, kKind);
-  fs::remove(folder / mark);
+  RemoveFile(folder / mark);
 }
 
 // Before any work: at its end the old capture would find no room.
@@ -123,7 +124,7 @@ void CaptureWriter::State::MoveIntoPlace() {
     work->MoveTo(folder);
   } catch (const Error&) {
     if (replaces && !fs::exists(folder)) Rename(aside, folder);
-    if (replaces) fs::remove(folder / mark);
+    if (replaces) RemoveFile(folder / mark);
     throw;
   }
   if (replaces) RemoveFolder(aside, mark);
@@ -132,7 +133,7 @@ void CaptureWriter::State::MoveIntoPlace() {
 
 CaptureWriter::CaptureWriter(const fs::path& folder, const StoreOptions& options)
     : state_(std::make_unique<State>()) {
-  state_->folder = WithoutTrailingSlash(folder);
+  state_->folder = ResolveLinks(WithoutTrailingSlash(folder));
   state_->partial = WorkFolder::Of(state_->folder);
   state_->aside = state_->folder.string() + ".replaced";
   state_->options = options;
@@ -176,8 +177,7 @@ void CaptureWriter::Write(const Capture& capture, Progress& progress) {
     stored.photos[index] = StorePhoto(capture.photos[index], partial);
     progress.Update(++done);
   });
-  fs::remove_all(partial / kFramesFolder, error);
-  Require(error, partial);
+  AsError([&] { RemoveTree(partial / kFramesFolder); });
   WriteFileAtomically(partial / kCaptureFile, CaptureToJson(stored));
   AsError([&] { state_->MoveIntoPlace(); });
 }

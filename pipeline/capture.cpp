@@ -1,6 +1,7 @@
 #include "pipeline/capture.h"
 
 #include "capture/ingest.h"
+#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 
 namespace dtr::pipeline {
@@ -31,13 +32,13 @@ capture::Capture Ingest(const fs::path& source, const capture::VideoOptions& vid
                                    progress);
   } else {
     const fs::path frames = frames_folder();
-    fs::remove_all(frames);
+    RemoveTree(frames);
     fs::create_directories(frames);
     photos = capture::IngestVideos(videos, video, frames, progress);
   }
   if (!capture::ArePanoramas(photos, panoramas)) return photos;
   const fs::path views = frames_folder() / "views";
-  fs::remove_all(views);
+  RemoveTree(views);
   return capture::SplitPanoramas(photos, views, video.threads, progress);
 }
 

@@ -5,6 +5,7 @@
 
 #include <sstream>
 
+#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/process.h"
 
@@ -142,8 +143,7 @@ void RunColmap(const std::vector<std::string>& argv, StepRecord& record,
                const std::function<void(const std::string&)>& on_line, Progress& progress) {
   progress.ThrowIfInterrupted();
   record.argv = argv;
-  std::error_code ignored;
-  std::filesystem::remove(record.log_file, ignored);  // RunProcess appends
+  TryRemoveFile(record.log_file);  // RunProcess appends
   CauseFinder cause;
   ProcessOptions options;
   options.log_file = record.log_file;

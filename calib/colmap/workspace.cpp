@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/colmap/model_io.h"
+#include "dtr/base/delete.h"
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -80,7 +81,7 @@ void WriteStamp(const fs::path& file, const std::string& fingerprint,
 }
 
 void Link(const fs::path& target, const fs::path& link) {
-  RemoveAll(link);
+  RemoveTree(link);
   std::error_code failure;
   fs::create_symlink(fs::absolute(target), link, failure);
   if (failure) {
@@ -166,12 +167,6 @@ const char* NameOf(Matching matching) {
   return "";
 }
 
-void RemoveAll(const fs::path& path) {
-  std::error_code failure;
-  fs::remove_all(path, failure);
-  if (failure) throw Error(path.string() + ": cannot be removed: " + failure.message());
-}
-
 void MakeFolder(const fs::path& path) {
   std::error_code failure;
   fs::create_directories(path, failure);
@@ -240,7 +235,7 @@ void Workspace::LinkPhotos(const fs::path& images_dir) const {
     for (const auto& entry : fs::directory_iterator(links)) {
       if (!wanted.contains(entry.path())) others.push_back(entry.path());
     }
-    for (const fs::path& other : others) RemoveAll(other);
+    for (const fs::path& other : others) RemoveTree(other);
   }
   for (const auto& [link, target] : wanted) {
     std::error_code none;
@@ -293,7 +288,7 @@ void Workspace::Step(const std::string& name, const std::string& inputs,
     records_.insert(records_.end(), finished->records.begin(), finished->records.end());
     return;
   }
-  RemoveAll(stamp);
+  RemoveTree(stamp);
   step_ = name;
   first_of_step_ = records_.size();
   try {

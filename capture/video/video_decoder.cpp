@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "dtr/base/error.h"
+#include "dtr/base/regular_file.h"
 #include "dtr/io/image_io.h"
 
 extern "C" {
@@ -58,7 +59,7 @@ std::span<const std::uint8_t> SideDataOf(const AVStream& stream, AVPacketSideDat
 // only what begins as one of these is given to it.
 bool BeginsAsVideo(const fs::path& file) {
   std::array<char, 400> bytes{};  // three packets of a transport stream
-  std::ifstream(file, std::ios::binary).read(bytes.data(), bytes.size());
+  StreamOf(file).read(bytes.data(), bytes.size());
   const std::string_view begin(bytes.data(), bytes.size());
   static constexpr std::array<std::string_view, 10> kBoxes{
       // of MP4, QuickTime and Motion JPEG 2000

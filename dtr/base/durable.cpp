@@ -13,8 +13,9 @@
 #include <tuple>
 #include <vector>
 
+#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
-#include "dtr/base/open_file.h"
+#include "dtr/base/regular_file.h"
 
 namespace dtr {
 namespace fs = std::filesystem;
@@ -35,10 +36,10 @@ int Sync(const fs::path& path, int flags) {
 
 // std::filesystem::copy_file calls a full disk an input/output error.
 void CopyContent(const fs::path& from, const fs::path& to) {
-  const OpenFile in(from, O_RDONLY);
+  const OpenFile in = OpenToRead(from);
   struct stat about;
   Done(fstat(in.fd(), &about));
-  const OpenFile out(to, O_WRONLY | O_CREAT | O_EXCL, S_IRUSR | S_IWUSR);
+  const OpenFile out(to, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW, S_IRUSR | S_IWUSR);
   std::vector<char> buffer(size_t{1} << 18);
   while (const auto size = static_cast<size_t>(Done(read(in.fd(), buffer.data(), buffer.size())))) {
     WriteAll(out, {buffer.data(), size});
@@ -82,8 +83,7 @@ void Rename(const fs::path& from, const fs::path& to) {
 void CopyFileAtomically(const fs::path& from, const fs::path& to) {
   const fs::path temporary = TemporaryFor(to);
   try {
-    std::error_code error;
-    fs::remove(temporary, error);  // of an earlier process of our number, perhaps to be read only
+    TryRemoveFile(temporary);  // of an earlier process of our number, perhaps to be read only
     try {
       CopyContent(from, temporary);
     } catch (const std::system_error& failure) {
@@ -91,15 +91,14 @@ void CopyFileAtomically(const fs::path& from, const fs::path& to) {
     }
     Rename(temporary, to);
   } catch (...) {
-    std::error_code ignored;
-    fs::remove(temporary, ignored);
+    TryRemoveFile(temporary);
     throw;
   }
 }
 
 void AppendDurably(const fs::path& file, std::string_view record) {
   try {
-    const OpenFile out(file, O_WRONLY | O_CREAT | O_APPEND, 0644);
+    const OpenFile out(file, O_WRONLY | O_CREAT | O_APPEND | O_NOFOLLOW, 0644);
     const off_t before = Done(lseek(out.fd(), 0, SEEK_END));
     try {
       WriteAll(out, record);
@@ -136,26 +135,18 @@ bool IsTemporaryFile(const fs::path& file) {
          name.compare(end + 1 - kLength, kLength, ".tmp") == 0;
 }
 
-void RemoveTemporaryFiles(const fs::path& folder) {
-  std::vector<fs::path> files;
-  std::error_code error;
-  fs::recursive_directory_iterator entries(folder, error);
-  for (; !error && entries != fs::recursive_directory_iterator(); entries.increment(error)) {
-    if (entries->is_regular_file() && IsTemporaryFile(entries->path())) {
-      files.push_back(entries->path());
-    }
+void RejectLinks(const fs::path& folder, const std::function<bool(const fs::path&)>& ours) {
+  const auto reject = [](const fs::path& link) {
+    throw UsageError(
+        link.string() +
+        ": work in progress must not be a symbolic link, which leads out of its folder; "
+        "move it away");
+  };
+  if (fs::is_symlink(folder)) reject(folder);
+  if (!fs::is_directory(folder)) return;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.is_symlink() && !ours(entry.path().lexically_relative(folder))) reject(entry.path());
   }
-  for (size_t i = 0; !error && i < files.size(); ++i) fs::remove(files[i], error);
-  if (error) Fail(folder, "temporary files in it cannot be deleted", error.message());
-}
-
-void RemoveFolder(const fs::path& folder, const std::string& last) {
-  std::vector<fs::path> others;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.path().filename() != last) others.push_back(entry.path());
-  }
-  for (const fs::path& path : others) fs::remove_all(path);
-  fs::remove_all(folder);
 }
 
 bool IsEmptyFolder(const fs::path& folder) {
@@ -188,7 +179,7 @@ void RejectForeign(const fs::path& folder, const std::function<bool(const std::s
 }
 
 std::optional<FileLock> FileLock::Try(const fs::path& file, Kind kind) {
-  const int fd = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  const int fd = open(file.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0644);
   if (fd < 0) Fail(file, "cannot be opened", std::strerror(errno));
   FileLock lock(fd);
   if (flock(fd, (kind == Kind::kAlone ? LOCK_EX : LOCK_SH) | LOCK_NB) == 0) return lock;

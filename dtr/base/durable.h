@@ -38,12 +38,14 @@ std::filesystem::path TemporaryFor(const std::filesystem::path& file);
 /// True for what WriteFileAtomically and CopyFileAtomically leave when they are killed:
 /// NAME.tmp and a number.
 bool IsTemporaryFile(const std::filesystem::path& file);
-/// Deletes all such files below `folder`, of which no process may be at work. Throws Error.
-void RemoveTemporaryFiles(const std::filesystem::path& folder);
-
-/// Deletes a folder and everything in it, the file `last` after all others: as long as anything is
-/// there, it says whose it is. Throws std::filesystem::filesystem_error.
-void RemoveFolder(const std::filesystem::path& folder, const std::string& last);
+/// Before work in a folder goes on: throws UsageError naming a symbolic link in it that is not
+/// `ours` (asked with its path below `folder`), or the folder itself where it is one. Work would be
+/// written and deleted where such a link leads.
+void RejectLinks(
+    const std::filesystem::path& folder,
+    const std::function<bool(const std::filesystem::path& inside)>& ours = [](const auto&) {
+      return false;
+    });
 
 /// True for a folder in which nothing is; false for anything else and for nothing.
 bool IsEmptyFolder(const std::filesystem::path& folder);

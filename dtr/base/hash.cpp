@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "dtr/base/error.h"
+#include "dtr/base/regular_file.h"
 
 namespace dtr {
 namespace {
@@ -48,8 +49,7 @@ std::string Sha256(std::span<const std::byte> data) {
 }
 
 std::string Sha256OfFile(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw Error(file.string() + ": cannot be read: " + std::strerror(errno));
+  std::ifstream in = StreamOf(file);
   Sha256Stream stream;
   std::vector<char> buffer(1 << 16);
   while (in.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) || in.gcount() > 0) {

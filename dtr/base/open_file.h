@@ -1,4 +1,4 @@
-// dtr/base/open_file.h -- file descriptors, for what dtr/base itself writes.
+// dtr/base/open_file.h -- file descriptors.
 #pragma once
 #include <fcntl.h>
 #include <sys/types.h>
@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
 namespace dtr {
 
@@ -22,7 +23,10 @@ class OpenFile {
  public:
   OpenFile(const std::filesystem::path& file, int flags, mode_t mode = 0)
       : fd_(static_cast<int>(Done(open(file.c_str(), flags | O_CLOEXEC, mode)))) {}
-  ~OpenFile() { close(fd_); }
+  ~OpenFile() {
+    if (fd_ >= 0) close(fd_);
+  }
+  OpenFile(OpenFile&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
   OpenFile(const OpenFile&) = delete;
   OpenFile& operator=(const OpenFile&) = delete;
   int fd() const { return fd_; }

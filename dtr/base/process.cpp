@@ -14,6 +14,7 @@
 #include <cstring>
 #include <fstream>
 #include <sstream>
+#include <tuple>
 
 #include "dtr/base/error.h"
 
@@ -67,8 +68,10 @@ class LineSplitter {
 
 // Reads the child's output until it closes it, stopping the child on request.
 void Drain(pid_t child, int output, const ProcessOptions& options) {
-  std::ofstream log;
-  if (!options.log_file.empty()) log.open(options.log_file, std::ios::app | std::ios::binary);
+  const int log = options.log_file.empty()
+                      ? -1
+                      : open(options.log_file.c_str(),
+                             O_WRONLY | O_CREAT | O_APPEND | O_NOFOLLOW | O_CLOEXEC, 0644);
   LineSplitter lines(options.on_line);
   char buffer[4096];
   bool asked_to_stop = false;
@@ -87,10 +90,11 @@ void Drain(pid_t child, int output, const ProcessOptions& options) {
     const ssize_t got = read(output, buffer, sizeof buffer);
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) break;
-    if (log) log.write(buffer, got);
+    if (log >= 0) std::ignore = write(log, buffer, static_cast<size_t>(got));
     lines.Feed(buffer, static_cast<size_t>(got));
   }
   lines.Flush();
+  if (log >= 0) close(log);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <system_error>
 #include <vector>
 
+#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/open_file.h"
 
@@ -44,7 +45,7 @@ void ClearLeftOver(const fs::path& parent, const std::string& prefix) {
   for (const fs::path& folder : candidates) {
     try {
       const auto open = OpenFolder(folder);
-      if (IsOurs(*open) && Lock(*open) == Locked::kYes) fs::remove_all(folder, error);
+      if (IsOurs(*open) && Lock(*open) == Locked::kYes) TryRemoveTree(folder);
     } catch (const std::system_error&) {
       continue;  // gone meanwhile, or none that we may open
     }
@@ -81,9 +82,6 @@ TemporaryFolder::TemporaryFolder(const fs::path& parent, const std::string& pref
   path_ = name;
 }
 
-TemporaryFolder::~TemporaryFolder() {
-  std::error_code ignored;
-  fs::remove_all(path_, ignored);
-}
+TemporaryFolder::~TemporaryFolder() { TryRemoveTree(path_); }
 
 }  // namespace dtr

@@ -2,32 +2,27 @@
 
 #include <system_error>
 #include <utility>
-#include <vector>
 
+#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 
 namespace dtr {
 namespace fs = std::filesystem;
-namespace {
-
-void Clear(const fs::path& folder, const std::string& but) {
-  std::vector<fs::path> stale;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.path().filename() != but) stale.push_back(entry.path());
-  }
-  for (const fs::path& path : stale) fs::remove_all(path);
-}
-
-}  // namespace
 
 fs::path WorkFolder::Of(const fs::path& target) {
-  return WithoutTrailingSlash(target).string() + ".partial";
+  return ResolveLinks(WithoutTrailingSlash(target)).string() + ".partial";
 }
 
 void WorkFolder::RejectForeign(const fs::path& folder, const std::string& kind) {
-  if (!fs::exists(fs::symlink_status(folder)) || IsEmptyFolder(folder)) return;
-  if (fs::is_regular_file(folder / MarkOf(kind))) return;
+  const auto is = [](const fs::path& path, fs::file_type type) {
+    return fs::symlink_status(path).type() == type;
+  };
+  if (is(folder, fs::file_type::not_found)) return;
+  const bool is_folder = is(folder, fs::file_type::directory);
+  if (is_folder && (fs::is_empty(folder) || is(folder / MarkOf(kind), fs::file_type::regular))) {
+    return;
+  }
   throw UsageError(folder.string() + ": expected nothing or an unfinished " + kind +
                    ", found something else; move it away");
 }
@@ -43,7 +38,7 @@ WorkFolder::WorkFolder(fs::path folder, std::string kind)
     RejectForeign(path_, kind_);
     fs::create_directories(path_);
     lock_ = Lock(path_, kind_);
-    Clear(path_, MarkOf(kind_));
+    ClearFolder(path_, MarkOf(kind_));
   } catch (const fs::filesystem_error& error) {
     throw Error(path_.string() + ": cannot be written: " + error.code().message());
   }
@@ -59,16 +54,19 @@ WorkFolder::~WorkFolder() {
 }
 
 void WorkFolder::MoveTo(const fs::path& target) {
-  Rename(path_, target);
+  const fs::path place = ResolveLinks(WithoutTrailingSlash(target));
+  Rename(path_, place);
   moved_ = true;
-  path_ = WithoutTrailingSlash(target);
+  path_ = place;
   SyncFolder(path_.has_parent_path() ? path_.parent_path() : ".");
 }
 
 void WorkFolder::Unmark() {
-  std::error_code error;
-  fs::remove(path_ / MarkOf(kind_), error);
-  if (error) throw Error(path_.string() + ": its mark cannot be deleted: " + error.message());
+  try {
+    RemoveFile(path_ / MarkOf(kind_));
+  } catch (const fs::filesystem_error& error) {
+    throw Error(path_.string() + ": its mark cannot be deleted: " + error.code().message());
+  }
 }
 
 void WorkFolder::Become(const fs::path& target) {

@@ -12,6 +12,8 @@
 
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
+#include "dtr/base/file_stream.h"
+#include "dtr/base/files.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
@@ -58,7 +60,7 @@ std::vector<Clip> ClipsOf(DtrSet& set) {
 }
 
 void WriteRaw(const fs::path& file, const fs::path& set_folder, const Clip& clip, bool lossless) {
-  std::ofstream out(file, std::ios::binary);
+  FileStream out(file);
   LoadOptions load;
   load.depth = false;
   load.threads = 1;
@@ -67,11 +69,9 @@ void WriteRaw(const fs::path& file, const fs::path& set_folder, const Clip& clip
     LoadPixels(set_folder, loaded, load);
     const std::vector<std::uint8_t> bytes =
         lossless ? loaded.image.data() : YCbCrFromRgb(loaded.image);
-    out.write(reinterpret_cast<const char*>(bytes.data()),
-              static_cast<std::streamsize>(bytes.size()));
+    out.Write({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   }
-  out.close();
-  if (!out) throw Error(file.string() + ": cannot be written; is the disk full?");
+  out.Flush();
 }
 
 /// One thread, as the bytes depend on it; no words of FFmpeg's that name its version. Images are
@@ -125,8 +125,7 @@ StoredFile Encoded(const fs::path& set_folder, const fs::path& work_folder, cons
                             result.exit_code, last_line));
   }
   fs::create_directories((set_folder / path).parent_path());
-  SyncFile(work.path() / "video.mp4");
-  Rename(work.path() / "video.mp4", set_folder / path);
+  PublishFile(work.path() / "video.mp4", set_folder / path);
   return {path, Sha256OfFile(set_folder / path), fs::file_size(set_folder / path)};
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "dtr/base/error.h"
+#include "dtr/base/regular_file.h"
 
 namespace dtr::io {
 namespace {
@@ -186,7 +187,7 @@ void ExpectPlausibleHeaders(Reader& exr) {
 }  // namespace
 
 void ExpectPlausibleExr(const fs::path& file) {
-  Reader exr{file, std::ifstream(file, std::ios::binary), fs::file_size(file)};
+  Reader exr{file, StreamOf(file), fs::file_size(file)};
   constexpr std::uintmax_t kMagicAndVersion = 8;
   if (exr.size >= kMagicAndVersion && ReadLittle32(exr.in) == kExrMagic)
     ExpectPlausibleHeaders(exr);

@@ -1,4 +1,5 @@
 #include "dtr/io/file_boxes.h"
+#include "dtr/base/regular_file.h"
 
 #include <algorithm>
 
@@ -9,10 +10,11 @@ constexpr std::uint64_t kLargestPiece = 64 << 20;  // of what is read into memor
 
 }  // namespace
 
-FileBytes::FileBytes(const std::filesystem::path& file) : in_(file, std::ios::binary) {
+FileBytes::FileBytes(const std::filesystem::path& file) {
   std::error_code error;
-  size_ = std::filesystem::file_size(file, error);
-  if (error) size_ = 0;
+  if (!std::filesystem::is_regular_file(file, error)) return;
+  in_ = StreamOf(file);
+  size_ = std::filesystem::file_size(file);
 }
 
 std::string FileBytes::At(std::uint64_t offset, std::uint64_t count) {

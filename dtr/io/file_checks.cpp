@@ -8,6 +8,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/lower_case.h"
+#include "dtr/base/regular_file.h"
 #include "dtr/io/exr_checks.h"
 #include "dtr/io/image_io.h"
 
@@ -82,7 +83,7 @@ std::string Printable(std::string text) {
 
 void ExpectImageKind(const fs::path& file) {
   if (LowerExtension(file) == ".tga") return;  // the one format that begins with no mark
-  std::ifstream in(file, std::ios::binary);
+  std::ifstream in = StreamOf(file);
   std::array<char, 12> bytes{};
   in.read(bytes.data(), bytes.size());
   const std::string start(bytes.data(), static_cast<size_t>(in.gcount()));
@@ -97,7 +98,7 @@ void ExpectImageKind(const fs::path& file) {
 bool HoldsPhoto(const fs::path& file) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) return false;
-  std::ifstream in(file, std::ios::binary);
+  std::ifstream in = StreamOf(file);
   std::array<char, 12> bytes{};
   in.read(bytes.data(), bytes.size());
   const std::string start(bytes.data(), static_cast<size_t>(in.gcount()));
@@ -116,7 +117,7 @@ bool HoldsPhoto(const fs::path& file) {
 }
 
 void ExpectWholeFile(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
+  std::ifstream in = StreamOf(file);
   if (StartsAsPng(in)) {
     ExpectPngEnd(file, in, fs::file_size(file));
     return;

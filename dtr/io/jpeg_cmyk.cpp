@@ -9,6 +9,7 @@
 #include <jpeglib.h>  // needs cstdio before it
 
 #include "dtr/base/error.h"
+#include "dtr/base/regular_file.h"
 
 namespace dtr::io {
 namespace {
@@ -64,6 +65,7 @@ bool Decode(std::FILE* file, jpeg_decompress_struct& jpeg, Complaint& complaint,
 }  // namespace
 
 std::optional<Grid<std::uint8_t>> ReadPlainCmykJpeg(const std::filesystem::path& file) {
+  RequireRegularFile(file);
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> in(std::fopen(file.c_str(), "rb"),
                                                            &std::fclose);
   if (!in) throw Error(file.string() + ": cannot be read");

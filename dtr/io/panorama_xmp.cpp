@@ -9,6 +9,7 @@
 
 #include "dtr/base/files.h"
 #include "dtr/base/lower_case.h"
+#include "dtr/base/regular_file.h"
 #include "dtr/io/oiio_files.h"
 
 namespace dtr::io {
@@ -113,8 +114,8 @@ std::optional<PanoramaXmp> PanoramaXmpIn(std::string_view xmp) {
 std::optional<PanoramaXmp> ReadPanoramaXmp(const fs::path& file) {
   std::error_code error;
   const auto size = static_cast<std::streamoff>(fs::file_size(file, error));
-  std::ifstream in(file, std::ios::binary);
-  if (error || !in) return {};
+  if (error) return {};
+  std::ifstream in = StreamOf(file);
   if (auto stated = PanoramaXmpIn(Part(in, 0, std::min(size, kSearchedBytes)))) return stated;
   if (size <= kSearchedBytes) return {};
   const std::streamoff from = std::max(kSearchedBytes / 2, size - kSearchedBytes);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "dtr/base/delete.h"
 #include "dtr/base/files.h"
 #include "dtr/io/hand_over.h"
 #include "dtr/io/json_fields.h"
@@ -17,10 +18,12 @@ constexpr char kFingerprint[] = "work/fingerprint.json";
 constexpr char kLockName[] = "lock";
 constexpr char kLock[] = "work/lock";
 constexpr char kReportFolder[] = "report";
-// "a/b.dtr/" and "a/b.dtr" are one folder.
-fs::path WithoutSlash(const fs::path& target) {
+
+// "a/b.dtr/" and "a/b.dtr" are one folder; of a link it is the one that it leads to, beside which
+// the work has to be.
+fs::path PlaceOf(const fs::path& target) {
   const fs::path path = fs::absolute(target).lexically_normal();
-  return path.has_filename() ? path : path.parent_path();
+  return ResolveLinks(path.has_filename() ? path : path.parent_path()).lexically_normal();
 }
 
 fs::path Beside(const fs::path& target, const std::string& suffix) {
@@ -49,6 +52,12 @@ std::string DifferingKeys(const std::string& a, const std::string& b) {
   return names;
 }
 
+// COLMAP finds the photos by links in its workspace, which nothing is written through.
+bool IsLinkToPhoto(const fs::path& inside) {
+  const std::string folder = inside.parent_path().filename().string();
+  return *inside.begin() == kWork && (folder == "images" || folder == "masks");
+}
+
 // True when a partial folder has more in it than what the constructor itself puts there. What a
 // killed process had not finished to write is nobody's work.
 bool HoldsWork(const fs::path& partial) {
@@ -64,7 +73,7 @@ bool HoldsWork(const fs::path& partial) {
 }  // namespace
 
 PartialSet::PartialSet(const fs::path& set, bool replace)
-    : target(WithoutSlash(set)),
+    : target(PlaceOf(set)),
       partial(Beside(target, ".partial")),
       aside(Beside(target, ".replaced")),
       done_work(Beside(target, ".partial.work")),
@@ -72,12 +81,18 @@ PartialSet::PartialSet(const fs::path& set, bool replace)
 
 fs::path WorkFolderOf(const fs::path& target) { return PartialSet(target, false).partial / kWork; }
 
+// What lies beside the target under a name of ours may have been put there by somebody else.
+void PartialSet::RejectLinksBeside() const {
+  RejectLinks(partial, IsLinkToPhoto);
+  RejectLinks(aside);
+  RejectLinks(done_work, [](const fs::path& inside) { return IsLinkToPhoto(kWork / inside); });
+}
+
 bool PartialSet::WasCutOff() const { return fs::exists(aside / kSetFile) || fs::exists(done_work); }
 
 void PartialSet::RemoveUnused() const {
-  std::error_code ignored;
   try {
-    if (!HoldsWork(partial)) fs::remove_all(partial, ignored);
+    if (!HoldsWork(partial)) TryRemoveTree(partial);
   } catch (const fs::filesystem_error&) {
     // The folder was taken away while we worked; there is nothing left to tidy.
   }
@@ -85,6 +100,7 @@ void PartialSet::RemoveUnused() const {
 
 // A replacement that was cut off between its two renames: the old set goes back.
 void PartialSet::Recover() const {
+  RejectLinksBeside();
   RecoverWork();
   if (!fs::exists(aside / kSetFile)) return;
   if (fs::exists(target / kSetFile)) {
@@ -164,6 +180,7 @@ void PartialSet::Open(const std::string& fingerprint_json) {
 
 void PartialSet::Join(const std::string& fingerprint_json) {
   const std::string fingerprint = Canonical(fingerprint_json, "fingerprint");
+  RejectLinks(partial, IsLinkToPhoto);
   if (!fs::exists(partial / kFingerprint)) {
     throw UsageError(partial.string() +
                      ": expected a build to join, found none; run its stage capture first");

@@ -55,6 +55,7 @@ struct PartialSet {
   void RemoveUnused() const;
 
  private:
+  void RejectLinksBeside() const;
   void RecoverWork() const;
   std::optional<FileLock> Lock(const std::filesystem::path& file) const;
   void ExpectFingerprint(const std::string& fingerprint) const;

@@ -3,6 +3,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "dtr/base/delete.h"
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -133,8 +134,7 @@ SetWriter::~SetWriter() {
 
 void SetWriter::Discard() noexcept {
   if (state_->joined) return;
-  std::error_code ignored;
-  fs::remove_all(state_->partial, ignored);
+  TryRemoveTree(state_->partial);
   state_->lock.reset();
   state_->finished = true;
 }
@@ -318,9 +318,9 @@ void SetWriter::State::RemoveUnnamed(const DtrSet& set) const {
       if (!entry.is_directory() && named.count(entry.path()) == 0) unnamed.push_back(entry.path());
     }
   }
-  for (const fs::path& file : unnamed) fs::remove(file);
+  for (const fs::path& file : unnamed) RemoveFile(file);
   for (const char* folder : kPixelFolders) {
-    if (IsEmptyFolder(partial / folder)) fs::remove(partial / folder);
+    if (IsEmptyFolder(partial / folder)) RemoveFile(partial / folder);
   }
 }
 

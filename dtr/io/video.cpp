@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "dtr/base/durable.h"
 #include "dtr/base/error.h"
+#include "dtr/base/files.h"
 #include "dtr/base/process.h"
 #include "dtr/io/image_io.h"
 
@@ -70,8 +70,7 @@ void VideoWriter::Finish(const Progress& progress) {
     throw Error(fmt::format("{}: ffmpeg failed with exit code {}: {}", target_.string(),
                             result.exit_code, last_line));
   }
-  SyncFile(frames / encoded);
-  Rename(frames / encoded, target_);
+  PublishFile(frames / encoded, target_);
 }
 
 }  // namespace dtr::io

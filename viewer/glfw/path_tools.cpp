@@ -8,6 +8,7 @@
 #include <system_error>
 #include <utility>
 
+#include "dtr/base/delete.h"
 #include "dtr/render/time_steps.h"
 #include "viewer/glfw/error_text.h"
 
@@ -85,9 +86,8 @@ void PathTools::Tend() {
 fs::path PathTools::DropRecording() {
   const fs::path target = recording_->target();
   recording_.reset();
-  std::error_code ignored;  // its name was free when it was chosen; it may be finished by now
-  fs::remove(target, ignored);
-  fs::remove(fs::path(target).replace_extension(".json"), ignored);
+  TryRemoveFile(target);  // its name was free when it was chosen; it may be finished by now
+  TryRemoveFile(fs::path(target).replace_extension(".json"));
   return target;
 }
 

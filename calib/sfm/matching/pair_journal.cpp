@@ -5,10 +5,12 @@
 #include <fstream>
 #include <type_traits>
 
+#include "dtr/base/delete.h"
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/hash.h"
+#include "dtr/base/regular_file.h"
 
 namespace dtr::sfm::matching {
 namespace {
@@ -197,19 +199,16 @@ void PairJournal::Remove(const fs::path& file) {
   std::vector<fs::path> all = PartsOf(file);
   all.push_back(file);
   for (const fs::path& one : all) {
-    std::error_code error;
-    fs::remove(one, error);
-    if (error) throw Error(one.string() + ": cannot be removed: " + error.message());
+    RemoveFile(one);
   }
 }
 
 // Takes over what the file holds and returns how many of its bytes are whole.
 std::uint64_t PairJournal::Read(const fs::path& file, const std::string& inputs,
                                 std::span<const size_t> features) {
-  std::ifstream in(file, std::ios::binary | std::ios::ate);
-  if (!in) return 0;
-  const auto size = static_cast<std::uint64_t>(std::max<std::streamoff>(0, in.tellg()));
-  in.seekg(0);
+  if (!fs::exists(file)) return 0;
+  std::ifstream in = StreamOf(file);
+  const std::uint64_t size = fs::file_size(file);
   const std::string expected = Header(inputs);
   std::string header(expected.size(), '\0');
   if (!in.read(header.data(), static_cast<std::streamsize>(header.size())) || header != expected) {

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "dtr/base/error.h"
+#include "dtr/base/regular_file.h"
 
 namespace dtr::io {
 namespace {
@@ -60,10 +61,10 @@ FileLook LookAt(const std::filesystem::path& file) {
   FileLook look;
   look.is_folder = std::filesystem::is_directory(file);
   if (look.is_folder) return look;
-  std::ifstream in(file, std::ios::binary);
+  std::ifstream in = StreamOf(file);
   look.head.resize(static_cast<size_t>(kHeadBytes));
   in.read(look.head.data(), kHeadBytes);
-  if (!in.is_open() || in.bad()) throw Error(file.string() + ": cannot be read");
+  if (in.bad()) throw Error(file.string() + ": cannot be read");
   look.head.resize(static_cast<size_t>(in.gcount()));
   if (look.head.starts_with("\xef\xbb\xbf")) look.head.erase(0, 3);
   const size_t first = look.head.find_first_not_of(" \t\r\n");

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "dtr/base/error.h"
+#include "dtr/base/file_stream.h"
 
 namespace dtr::io::internal {
 namespace {
@@ -62,18 +63,17 @@ bool IsOfACapture(const std::string& name) {
 void Extract(const fs::path& file, zip_t* archive, const zip_stat_t& stat, const fs::path& to) {
   const std::unique_ptr<zip_file_t, Closed> entry(zip_fopen_index(archive, stat.index, 0));
   if (!entry) Reject(file, zip_strerror(archive));
-  std::ofstream out(to, std::ios::binary | std::ios::trunc);
+  FileStream out(to);
   char buffer[1 << 16];
   zip_uint64_t left = stat.size;
   for (zip_int64_t bytes; (bytes = zip_fread(entry.get(), buffer, sizeof buffer)) != 0;) {
     if (bytes < 0) Reject(file, zip_file_strerror(entry.get()));
     if (static_cast<zip_uint64_t>(bytes) > left) Reject(file, "another length of a file in it");
     left -= static_cast<zip_uint64_t>(bytes);
-    out.write(buffer, bytes);
+    out.Write({buffer, static_cast<size_t>(bytes)});
   }
   if (left > 0) Reject(file, "another length of a file in it");
-  out.close();
-  if (!out) throw Error(to.string() + ": cannot be written; is the disk full?");
+  out.Flush();
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/base/regular_file.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -159,10 +160,12 @@ std::vector<std::string> CommandOf(const Batch& batch, const BatchStage& stage, 
 }
 
 std::string LastWords(const fs::path& log) {
-  std::ifstream in(log);
   std::string line, last;
-  while (std::getline(in, line)) {
-    if (line.find_first_not_of(" \t\r") != std::string::npos) last = line;
+  if (fs::exists(log)) {
+    std::ifstream in = StreamOf(log);
+    while (std::getline(in, line)) {
+      if (line.find_first_not_of(" \t\r") != std::string::npos) last = line;
+    }
   }
   if (last.empty()) return fmt::format("it said nothing; see {}", log.string());
   return fmt::format("it said: {}; see {}", last, log.string());

@@ -6,6 +6,7 @@
 
 #include "calib/bundle/refine.h"
 #include "calib/colmap/model_io.h"
+#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/machine.h"
@@ -168,8 +169,8 @@ std::optional<PhotoRefinement> KeptRefinement(const fs::path& folder,
 
 void Keep(const PhotoRefinement& refined, const Json& stamp, double wall_s, double cpu_s,
           const fs::path& folder) {
+  RemoveTree(folder);
   std::error_code error;
-  fs::remove_all(folder, error);
   fs::create_directories(folder, error);
   if (error) throw Error(folder.string() + ": cannot be made: " + error.message());
   colmap::WriteModel(folder / kModel, refined.model, colmap::Format::kBinary);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "pipeline/detail/depth/grid_files.h"
@@ -29,12 +30,6 @@ bool Exists(const fs::path& file) {
   const bool found = fs::exists(file, error);
   if (error) throw Error(file.string() + ": cannot be looked for: " + error.message());
   return found;
-}
-
-void Remove(const fs::path& file) {
-  std::error_code error;
-  fs::remove_all(file, error);
-  if (error) throw Error(file.string() + ": cannot be removed: " + error.message());
 }
 
 // False too for a file that was damaged: that costs time, never the job.
@@ -62,7 +57,7 @@ PlaneFiles::PlaneFiles(const fs::path& folder, const std::string& made_from, boo
                 ": expected planes of the frozen cameras, found others; dtr build without "
                 "a stage finds depth again");
   }
-  Remove(folder);
+  RemoveTree(folder);
   MakeFolder(folder);
   WriteFileAtomically(origin, made_from);
 }
@@ -90,7 +85,7 @@ void PlaneFiles::Drop(int round) {
   std::error_code error;
   fs::directory_iterator entry(folder_, error);
   for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
-    if (entry->path().filename().string().starts_with(prefix)) Remove(entry->path());
+    if (entry->path().filename().string().starts_with(prefix)) RemoveTree(entry->path());
   }
   if (error) throw Error(folder_.string() + ": cannot be listed: " + error.message());
 }
@@ -121,7 +116,7 @@ std::optional<std::vector<stereo::DepthRange>> PlaneFiles::LoadRanges(size_t vie
 }
 
 EstimateFiles::EstimateFiles(const fs::path& folder) : folder_(folder) {
-  Remove(folder);
+  RemoveTree(folder);
   MakeFolder(folder);
 }
 
@@ -141,6 +136,6 @@ void EstimateFiles::Save(int view, stereo::DepthEstimate&& estimate) {
   WriteGridFile(File(view), grids);
 }
 
-void EstimateFiles::Drop(int view) { Remove(File(view)); }
+void EstimateFiles::Drop(int view) { RemoveTree(File(view)); }
 
 }  // namespace dtr::pipeline

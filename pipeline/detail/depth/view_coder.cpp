@@ -1,5 +1,6 @@
 #include "pipeline/detail/depth/view_coder.h"
 
+#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/depth_io.h"
@@ -85,7 +86,7 @@ std::uint64_t ViewCoder::TryView(View& view, const View& before,
     write(file);
     read(file);
     const std::uint64_t bytes = fs::file_size(file);
-    fs::remove(file);
+    RemoveFile(file);
     return bytes;
   };
   std::uint64_t bytes = BytesOf(view.sigma_file);

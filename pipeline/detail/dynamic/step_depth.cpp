@@ -8,6 +8,7 @@
 #include <set>
 #include <utility>
 
+#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/memory_budget.h"
 #include "dtr/base/quiet_progress.h"
@@ -71,7 +72,7 @@ class TemporalDepth {
       open += ComputeStep(step, made_from, background_planes) / static_cast<double>(steps);
       progress_.Update(static_cast<int>(step) + 1);
     }
-    fs::remove_all(Work(StepName(steps - 1)));
+    RemoveTree(Work(StepName(steps - 1)));
     if (open > 0) {
       progress_.Note(fmt::format(
           "what stands still keeps one depth: {:.1f} % of the pixels were worked on per time step",
@@ -163,7 +164,7 @@ class TemporalDepth {
     DepthStage(still, scene_, options_.depth, options_.quality, stage, writer_, quiet);
     PutBack(std::move(still), step, set_);
     // The planes of the time step before are needed until this one is whole.
-    if (step > 0) fs::remove_all(Work(StepName(step - 1)));
+    if (step > 0) RemoveTree(Work(StepName(step - 1)));
     return reader.OpenShare();
   }
 
@@ -206,7 +207,7 @@ void ComputeAlone(DtrSet& set, const SparseScene& points, const StepDepthOptions
     QuietProgress quiet(progress);
     DepthStage(still, points, options.depth, options.quality, stage, writer, quiet);
     PutBack(std::move(still), step, set);
-    fs::remove_all(stage.work);
+    RemoveTree(stage.work);
     progress.Update(static_cast<int>(step) + 1);
   }
 }

@@ -1,10 +1,10 @@
 #include "pipeline/detail/export/coloured_points.h"
 
 #include "calib/colmap/export.h"
+#include "dtr/base/file_stream.h"
 #include "dtr/io/set_io.h"
 #include "pipeline/detail/depth/points_from_depth.h"
 #include "pipeline/detail/export/common.h"
-#include "pipeline/detail/export/file_stream.h"
 #include "pipeline/detail/export/ply_header.h"
 
 namespace dtr::pipeline {

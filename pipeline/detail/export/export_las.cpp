@@ -5,9 +5,10 @@
 #include <limits>
 
 #include "dtr/base/error.h"
+#include "dtr/base/file_stream.h"
 #include "dtr/base/files.h"
 #include "pipeline/detail/export/common.h"
-#include "pipeline/detail/export/file_stream.h"
+#include "pipeline/detail/export/file_in_work.h"
 #include "pipeline/detail/export/fuse.h"
 #include "pipeline/export.h"
 

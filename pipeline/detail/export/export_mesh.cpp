@@ -2,11 +2,12 @@
 #include <fmt/format.h>
 
 #include "dtr/base/error.h"
+#include "dtr/base/file_stream.h"
 #include "dtr/base/files.h"
 #include "dtr/base/lower_case.h"
 #include "dtr/render/colour.h"
 #include "pipeline/detail/export/common.h"
-#include "pipeline/detail/export/file_stream.h"
+#include "pipeline/detail/export/file_in_work.h"
 #include "pipeline/detail/export/glb.h"
 #include "pipeline/detail/export/mesh.h"
 #include "pipeline/export.h"

@@ -6,11 +6,11 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "dtr/base/file_stream.h"
 #include "dtr/base/files.h"
 #include "pipeline/detail/export/coloured_points.h"
 #include "pipeline/detail/export/common.h"
 #include "pipeline/detail/export/depth_file.h"
-#include "pipeline/detail/export/file_stream.h"
 #include "pipeline/export.h"
 
 namespace dtr::pipeline {

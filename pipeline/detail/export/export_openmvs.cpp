@@ -7,10 +7,10 @@
 
 #include "calib/colmap/export.h"
 #include "dtr/base/durable.h"
+#include "dtr/base/file_stream.h"
 #include "pipeline/detail/export/coloured_points.h"
 #include "pipeline/detail/export/common.h"
 #include "pipeline/detail/export/depth_file.h"
-#include "pipeline/detail/export/file_stream.h"
 #include "pipeline/detail/export/fuse.h"
 #include "pipeline/export.h"
 

@@ -1,7 +1,8 @@
 // The fused depth maps as a cloud.
+#include "dtr/base/file_stream.h"
 #include "dtr/base/files.h"
 #include "pipeline/detail/export/common.h"
-#include "pipeline/detail/export/file_stream.h"
+#include "pipeline/detail/export/file_in_work.h"
 #include "pipeline/detail/export/fuse.h"
 #include "pipeline/detail/export/ply_header.h"
 #include "pipeline/export.h"

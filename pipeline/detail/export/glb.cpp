@@ -8,8 +8,8 @@
 #include <limits>
 
 #include "dtr/base/error.h"
+#include "dtr/base/file_stream.h"
 #include "pipeline/detail/export/common.h"
-#include "pipeline/detail/export/file_stream.h"
 #include "viewer/world_up.h"
 
 namespace dtr::pipeline {

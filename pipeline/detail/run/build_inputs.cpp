@@ -9,6 +9,7 @@
 #include "capture/ingest.h"
 #include "capture/store.h"
 #include "capture/video/frames.h"
+#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
 #include "pipeline/calibrate.h"
@@ -99,7 +100,7 @@ capture::Capture FramesOf(const BuildOptions& options, const std::filesystem::pa
     capture::WriteCapture(
         frames, kept, {.replace = false, .threads = options.threads, .memory_gb = video.memory_gb},
         progress);
-    std::filesystem::remove_all(fresh);
+    RemoveTree(fresh);
   }
   return capture::ReadCapture(kept);
 }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "pipeline/build.h"
 
@@ -48,11 +49,7 @@ void ForgetStage(const fs::path& folder, const std::string& name) {
   }
   // Records of parts, and the cameras frozen for them, would speak of what is gone; then later
   // stages first: should this be cut off, what is left is the work of an earlier moment.
-  const auto remove = [&](const std::string& path) {
-    std::error_code error;
-    fs::remove_all(folder / path, error);
-    if (error) throw Error((folder / path).string() + ": cannot be removed: " + error.message());
-  };
+  const auto remove = [&](const std::string& path) { RemoveTree(folder / path); };
   for (const char* of_parts : {"work/parts", "work/frozen_cameras"}) remove(of_parts);
   for (auto kept = all.end(); kept-- != from;) {
     for (const std::string& path : kept->paths) remove(path);

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/colmap/model_io.h"
+#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "pipeline/detail/photos/input_hash.h"
@@ -146,8 +147,7 @@ DonePart TotalOf(const fs::path& work, const std::vector<std::string>& stages) {
 
 void FreezeCalibration(const CalibratedPhotos& calibrated, const fs::path& work) {
   const fs::path folder = work / kFrozen;
-  std::error_code error;
-  fs::remove_all(folder, error);
+  RemoveTree(folder);
   MakeFolder(folder);
   colmap::WriteModel(folder / kModel, calibrated.model, colmap::Format::kBinary);
   const Eigen::Vector3d& origin = calibrated.world_origin;

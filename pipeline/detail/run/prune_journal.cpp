@@ -7,6 +7,7 @@
 
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
+#include "dtr/base/regular_file.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -15,7 +16,8 @@ using Json = nlohmann::ordered_json;
 
 PruneJournal::PruneJournal(const std::filesystem::path& file) : file_(file) {
   std::uintmax_t whole = 0;
-  if (std::ifstream in(file); in) {
+  if (std::filesystem::exists(file)) {
+    std::ifstream in = StreamOf(file);
     constexpr std::uintmax_t kMaxBytes = 256 << 20;  // of a day's measurements thousands
     if (std::filesystem::file_size(file) > kMaxBytes) {
       throw Error(

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/machine.h"
 #include "dtr/io/run_record.h"
@@ -67,7 +68,7 @@ void WriteResized(const std::filesystem::path& from, const std::filesystem::path
   SparseScene sparse = io::LoadSparse(from, set);
   std::vector<Eigen::Vector2d> factors;  // of pixels, per view
   // Nothing is resumed: the folder is this run's own.
-  std::filesystem::remove_all(to.string() + ".partial");
+  RemoveTree(to.string() + ".partial");
   io::SetWriter writer(to, fmt::format(R"({{"max_size_px":{}}})", max_size_px), true);
   io::LoadOptions load;
   load.depth = false;

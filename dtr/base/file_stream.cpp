@@ -1,4 +1,4 @@
-#include "pipeline/detail/export/file_stream.h"
+#include "dtr/base/file_stream.h"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -6,10 +6,10 @@
 #include <cerrno>
 #include <system_error>
 
-#include "dtr/base/durable.h"
+#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 
-namespace dtr::pipeline {
+namespace dtr {
 namespace {
 
 constexpr size_t kBufferBytes = 1 << 20;
@@ -27,7 +27,8 @@ void Naming(const std::filesystem::path& file, const Function& function) {
 }  // namespace
 
 FileStream::FileStream(std::filesystem::path file) : file_(std::move(file)) {
-  Naming(file_, [&] { open_.emplace(file_, O_WRONLY | O_CREAT | O_TRUNC, 0666); });
+  TryRemoveFile(file_);
+  Naming(file_, [&] { open_.emplace(file_, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW, 0666); });
   buffer_.reserve(kBufferBytes);
 }
 
@@ -50,13 +51,4 @@ void FileStream::Replace(std::string_view bytes) {
   });
 }
 
-FileInWork::FileInWork(const std::filesystem::path& target)
-    : target_(target), work_(WorkFolder::Of(target), "export") {}
-
-void FileInWork::Publish() {
-  SyncFile(path());
-  Rename(path(), target_);
-  SyncFolder(std::filesystem::absolute(target_).parent_path());
-}
-
-}  // namespace dtr::pipeline
+}  // namespace dtr
