@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <cstdlib>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "cli/number_checks.h"
@@ -50,23 +49,6 @@ const CalledApp* CallerOf(const CLI::App& app) {
   return dynamic_cast<const CalledApp*>(root);
 }
 
-void RejectOutputs(const CLI::App& command, const std::string& json_target) {
-  if (!json_target.empty() && json_target != "-") {
-    RequireFolderOf(json_target, "--json");
-    if (std::filesystem::is_directory(json_target)) {
-      throw UsageError("--json " + json_target + ": expected a file name, found a folder");
-    }
-  }
-  const CLI::Option* output = command.get_option_no_throw("--output");
-  if (output == nullptr || output->empty()) return;
-  const std::string& target = output->results().back();
-  if (target.empty()) throw UsageError("--output: expected a name, found an empty one");
-  if (!json_target.empty() && json_target != "-" &&
-      std::filesystem::weakly_canonical(json_target) == std::filesystem::weakly_canonical(target)) {
-    throw UsageError("--json " + json_target + ": expected another file than --output, found it");
-  }
-}
-
 }  // namespace
 
 void Context::EmitJson(const std::string& json) const {
@@ -109,10 +91,13 @@ void AddCommand(CLI::App& app, const std::string& name, const std::string& descr
       ->type_name("N");
   command->add_option("--seed", common->seed, "Seed of everything random")->type_name("N");
   const Action action = prepare(*command);
+  if (command->get_option_no_throw("--force") == nullptr) {
+    command->add_flag("--force", common->force, "Replace output files that exist");
+  }
   RejectWhatIsNoNumber(*command);
   // The exit code leaves through CLI::RuntimeError, CLI11's way of ending with a code of one's own.
   command->callback([command, common, action] {
-    RejectOutputs(*command, common->json_target);
+    RequireOutputs(*command, command->count("--force") > 0);
     const CalledApp* const called = CallerOf(*command);
     if (called != nullptr) common->json_text = &called->json();
     Console console =

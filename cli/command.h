@@ -19,6 +19,7 @@ struct CommonOptions {
   std::string* json_text = nullptr;  ///< of a command that another program calls: gets the JSON
   int threads = 0;                   ///< 0: all cores
   std::uint64_t seed = 0;
+  bool force = false;  ///< --force of commands that have no such option of their own
 };
 
 /// What a command's action is given.

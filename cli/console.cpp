@@ -73,7 +73,7 @@ void Console::Stage(const std::string& name, int total) {
   if (terminal_) {
     DrawBar();
   } else if (!name.empty()) {
-    fmt::print(stderr, "== {}\n", name);
+    WriteErr(fmt::format("== {}\n", name));
   }
 }
 
@@ -85,8 +85,8 @@ void Console::Update(int done) {
     DrawBar();
   } else if (total_ > 0 && 10 * done / total_ > told_tenths_) {
     told_tenths_ = 10 * done / total_;
-    fmt::print(stderr, "   {} {}/{}{}\n", stage_, done, total_,
-               TimeLeft(SecondsSince(stage_start_), static_cast<double>(done) / total_));
+    WriteErr(fmt::format("   {} {}/{}{}\n", stage_, done, total_,
+                         TimeLeft(SecondsSince(stage_start_), static_cast<double>(done) / total_)));
   }
 }
 
@@ -94,16 +94,16 @@ void Console::Note(const std::string& line) {
   if (caller_ != nullptr) return caller_->Note(line);
   const std::lock_guard lock(mutex_);
   ClearBar();
-  fmt::print(stderr, "   {}\n", WithOptionNames(line));
+  WriteErr(fmt::format("   {}\n", ShownText(line)));
 }
 
 void Console::Say(const std::string& line) {
   if (caller_ != nullptr) return caller_->Note(line);
   const std::lock_guard lock(mutex_);
   ClearBar();
-  const std::string text = WithOptionNames(line);
+  const std::string text = ShownText(line);
   if (json_on_stdout_) {
-    fmt::print(stderr, "{}\n", text);
+    WriteErr(fmt::format("{}\n", text));
   } else {
     WriteOut(text + "\n");
   }
@@ -124,9 +124,9 @@ void Console::FinishStage() {
   const double spent_s = SecondsSince(stage_start_);
   if (terminal_) {
     ClearBar();
-    fmt::print(stderr, "   {} ({}, {})\n", stage_, Duration(spent_s), PeakMemory());
+    WriteErr(fmt::format("   {} ({}, {})\n", stage_, Duration(spent_s), PeakMemory()));
   } else if (spent_s >= kWorthTellingS) {
-    fmt::print(stderr, "   {}: {}, {}\n", stage_, Duration(spent_s), PeakMemory());
+    WriteErr(fmt::format("   {}: {}, {}\n", stage_, Duration(spent_s), PeakMemory()));
   }
 }
 
@@ -142,15 +142,13 @@ void Console::DrawBar() {
     tail = fmt::format("{:3.0f} %", 100 * share) + TimeLeft(spent_s, share);
   }
   tail += ", " + PeakMemory();
-  fmt::print(stderr, "\r\033[K   [{}{}] {} {}", std::string(static_cast<size_t>(filled), '='),
-             std::string(static_cast<size_t>(kBarWidth - filled), ' '), stage_, tail);
-  std::fflush(stderr);
+  WriteErr(fmt::format("\r\033[K   [{}{}] {} {}", std::string(static_cast<size_t>(filled), '='),
+                       std::string(static_cast<size_t>(kBarWidth - filled), ' '), stage_, tail));
 }
 
 void Console::ClearBar() {
   if (terminal_) {
-    fmt::print(stderr, "\r\033[K");
-    std::fflush(stderr);
+    WriteErr("\r\033[K");
   }
 }
 

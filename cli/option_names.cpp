@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <set>
 
+#include "dtr/base/utf8.h"
+
 namespace dtr::cli {
 namespace {
 
@@ -41,6 +43,10 @@ std::string WithOptionNames(const std::string& message) {
     }
   }
   return text + message.substr(at);
+}
+
+std::string ShownText(const std::string& message) {
+  return WithoutDirectionMarks(WithOptionNames(message));
 }
 
 }  // namespace dtr::cli

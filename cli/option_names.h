@@ -13,4 +13,7 @@ void LearnOptionNames(const CLI::App& app);
 /// called after. Others stay as they are.
 std::string WithOptionNames(const std::string& message);
 
+/// WithOptionNames for a terminal: names in it cannot turn the direction of writing.
+std::string ShownText(const std::string& message);
+
 }  // namespace dtr::cli

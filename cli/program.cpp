@@ -1,6 +1,8 @@
 #include "cli/program.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
@@ -37,7 +39,7 @@ int Run(int argc, char** argv) {
   // CLI11 would say that a command is missing, not that this one does not exist.
   const auto is_called = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
   if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(is_called).empty()) {
-    fmt::print(stderr, "dtr: no command is called '{}'; see dtr --help\n", argv[1]);
+    WriteErr(fmt::format("dtr: no command is called '{}'; see dtr --help\n", argv[1]));
     return kWrongUsage;
   }
   try {
@@ -51,7 +53,7 @@ int Run(int argc, char** argv) {
     WriteOut(text.str());
     return code;
   } catch (const CLI::ParseError& error) {
-    fmt::print(stderr, "dtr: {}; see dtr --help\n", error.what());
+    WriteErr(fmt::format("dtr: {}; see dtr --help\n", error.what()));
     return kWrongUsage;
   }
 }
@@ -66,34 +68,45 @@ void KeepFreedMemory() {
 #endif
 }
 
+/// A standard descriptor that the caller closed would be that of the next file that is opened, and
+/// messages would go into it. What is written to a closed standard output still fails.
+void OccupyStandardDescriptors() {
+  constexpr int kFlags[] = {O_RDONLY, O_RDONLY, O_WRONLY};
+  for (int fd = STDIN_FILENO; fd <= STDERR_FILENO; ++fd) {
+    if (fcntl(fd, F_GETFD) >= 0) continue;
+    if (open("/dev/null", kFlags[fd]) < 0) return;  // takes the lowest number that is free
+  }
+}
+
 }  // namespace
 
 int RunProgram(int argc, char** argv) {
+  OccupyStandardDescriptors();
   KeepFreedMemory();
   CatchInterrupts();
   try {
     return Run(argc, argv);
   } catch (const UsageError& error) {
-    fmt::print(stderr, "dtr: {}\n", WithOptionNames(error.what()));
+    WriteErr(fmt::format("dtr: {}\n", ShownText(error.what())));
     return kWrongUsage;
   } catch (const Error& error) {
-    fmt::print(stderr, "dtr: {}\n", WithOptionNames(error.what()));
+    WriteErr(fmt::format("dtr: {}\n", ShownText(error.what())));
     return kFailed;
   } catch (const std::filesystem::filesystem_error& error) {
-    fmt::print(stderr,
-               "dtr: {}: expected a folder or file that can be used, found: {}; fix it or choose "
-               "another\n",
-               error.path1().string(), error.code().message());
+    WriteErr(fmt::format(
+        "dtr: {}: expected a folder or file that can be used, found: {}; fix it or choose "
+        "another\n",
+        error.path1().string(), error.code().message()));
     return kFailed;
   } catch (const std::bad_alloc&) {
-    fmt::print(stderr,
-               "dtr: memory: expected enough for this job, found too little; close other programs, "
-               "or lower --max-size, --size or --memory\n");
+    WriteErr(
+        "dtr: memory: expected enough for this job, found too little; close other programs, "
+        "or lower --max-size, --size or --memory\n");
     return kFailed;
   } catch (const std::exception& error) {
-    fmt::print(stderr,
-               "dtr: expected no fault of its own, found: {}; report this line and the command\n",
-               error.what());
+    WriteErr(fmt::format(
+        "dtr: expected no fault of its own, found: {}; report this line and the command\n",
+        error.what()));
     return kFailed;
   }
 }

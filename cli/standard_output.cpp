@@ -15,4 +15,9 @@ void WriteOut(const std::string& text) {
   }
 }
 
+void WriteErr(const std::string& text) noexcept {
+  std::fwrite(text.data(), 1, text.size(), stderr);
+  std::fflush(stderr);
+}
+
 }  // namespace dtr::cli

@@ -60,5 +60,6 @@ std::map<std::string, std::string> SweepPlots(const SweepFacts& facts);
 /// Where `dtr bench` writes if not told, and its file with the sweep: NAME-bench beside the set.
 std::filesystem::path SweepFolderOf(const std::filesystem::path& set);
 inline constexpr char kSweepFile[] = "bench.json";
+inline constexpr char kWorkFile[] = "work.json";  ///< measurements, from which a sweep goes on
 
 }  // namespace dtr::cli

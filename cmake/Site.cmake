@@ -8,7 +8,7 @@ set(DTR_SITE_PAGES README.md
   docs/CALIBRATION.md docs/VALIDATION.md docs/BENCH.md
   docs/METHODS.md docs/RENDER_SPEC.md docs/FORMAT.md docs/CONVENTIONS.md docs/ARCHITECTURE.md docs/ERRORS.md
   docs/ACCURACY.md docs/accuracy/CAMERAS.md docs/accuracy/DEPTH.md docs/accuracy/RENDERING.md docs/accuracy/SPEED.md
-  docs/STABILITY.md docs/FUZZING.md docs/SANITIZERS.md docs/FIELD_CASES.md
+  docs/STABILITY.md docs/SECURITY.md docs/FUZZING.md docs/SANITIZERS.md docs/FIELD_CASES.md
   docs/BACKGROUND.md datasets/plaza/README.md CONTRIBUTING.md CHANGELOG.md)
 file(GLOB_RECURSE pages RELATIVE ${PROJECT_SOURCE_DIR} CONFIGURE_DEPENDS docs/*.md)
 list(REMOVE_ITEM pages ${DTR_SITE_PAGES})

@@ -6,10 +6,10 @@
 #include <nlohmann/json.hpp>
 
 #include "dtr/base/error.h"
-#include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/time_steps.h"
 #include "pipeline/detail/dynamic/evaluate_steps.h"
+#include "pipeline/detail/reports/comparison_images.h"
 #include "pipeline/evaluate_depth.h"
 
 namespace dtr::pipeline {
@@ -67,13 +67,8 @@ EvaluateResult Evaluate(const EvaluateRequest& request,
   evaluate.render = request.render;
   evaluate.render.threads = request.threads;
   evaluate.not_registered = NotRegistered(set);
-  if (!request.images.empty()) {
-    fs::create_directories(request.images);
-    evaluate.on_rendered = [&](const View& view, const RenderResult& filled) {
-      io::WriteImage(request.images / (view.id + ".png"),
-                     eval::ComparisonImage(filled.image, view.image, view.mask));
-    };
-  }
+  ComparisonImages images(request, set);
+  evaluate.on_rendered = images.Writer();
   const bool has_held_out =
       std::any_of(set.frames.front().views.begin(), set.frames.front().views.end(),
                   [](const View& view) { return view.role == ViewRole::kHeldOut; });
@@ -83,6 +78,7 @@ EvaluateResult Evaluate(const EvaluateRequest& request,
   } else if (request.leave_one_out || has_held_out || !result.depth) {
     result.views = eval::EvaluateHeldOut(set, evaluate, make_renderer(), progress);
   }
+  images.Finish();
   return result;
 }
 

@@ -17,6 +17,7 @@ struct EvaluateRequest {
   bool leave_one_out = false;    ///< every source view in turn, instead of the held-out ones
   std::filesystem::path truth;   ///< folder with cameras.json and depth/; empty: no depth scores
   std::filesystem::path images;  ///< folder for rendering | photo | difference; empty: none
+  bool force = false;            ///< files in that folder may be replaced
   RenderOptions render;
   bool measured_only = false;  ///< images are drawn without completed depth
   int threads = 0;

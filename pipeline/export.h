@@ -25,6 +25,7 @@ enum class DepthGrid {
 struct ExportRequest {
   std::filesystem::path set;
   std::filesystem::path output;  ///< folder or file to write
+  bool force = false;            ///< replaces a file, never a folder
   bool text = false;             ///< COLMAP's text files instead of binary
   int threads = 0;
   double memory_gb = 4;    ///< for depth maps that are held at a time

@@ -16,6 +16,7 @@
 #include "dtr/io/set_io.h"
 #include "dtr/io/validation_result.h"
 #include "dtr/render/scene.h"
+#include "pipeline/detail/run/output_folder.h"
 #include "pipeline/detail/web/web_view.h"
 #include "pipeline/evaluate.h"
 #include "pipeline/prune.h"
@@ -292,17 +293,16 @@ void Write(const WebPageRequest& request, const Files& files, const fs::path& wo
     made = work / files.front().name;
     WriteFileAtomically(made, files.front().bytes);
   }
-  Rename(made, request.output);
-  SyncFolder(fs::absolute(request.output).parent_path());
+  if (!request.as_site) return PublishFile(made, request.output);
+  const fs::path place = ResolveLinks(request.output);
+  Rename(made, place);
+  SyncFolder(fs::absolute(place).parent_path());
 }
 
 }  // namespace
 
 WebPageReport ExportWebPage(const WebPageRequest& request, Progress& progress) {
-  if (fs::exists(request.output)) {
-    throw UsageError(
-        fmt::format("{}: exists already; choose another name", request.output.string()));
-  }
+  RequireNew(request.output, request.force);
   const Source source = SourceOf(request, progress);
   const WorkFolder work(WorkFolder::Of(request.output), "export");
   WebPageReport report;

@@ -18,6 +18,7 @@ namespace dtr::pipeline {
 struct WebPageRequest {
   std::filesystem::path set;
   std::filesystem::path output;  ///< the file to write, or the folder
+  bool force = false;            ///< replaces a file, never a folder
   /// A folder of files for a web server, which gives views one by one, instead of one HTML file.
   bool as_site = false;
   /// At most so many MB (10^6 bytes): photos and depth are coded more coarsely, and less is taken

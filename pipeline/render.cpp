@@ -15,6 +15,7 @@
 #include "dtr/render/time_steps.h"
 #include "dtr/render/view_stream.h"
 #include "pipeline/detail/render/dynamic_scene.h"
+#include "pipeline/detail/run/output_folder.h"
 #include "pipeline/novel_frames.h"
 
 namespace dtr::pipeline {
@@ -25,11 +26,14 @@ namespace fs = std::filesystem;
 // Writes frames where the output says: one image, a folder of images, or a video.
 class FrameSink {
  public:
-  FrameSink(const fs::path& output, bool several) : output_(output), several_(several) {
-    if (output.extension() == ".mp4") {
-      video_.emplace(output, io::kVideoFramesPerSecond);
-    } else if (several) {
-      fs::create_directories(output);
+  FrameSink(const RenderRequest& request, const std::vector<NovelFrame>& frames)
+      : output_(request.output) {
+    if (output_.extension() == ".mp4") {
+      video_.emplace(output_, io::kVideoFramesPerSecond);
+    } else if (request.several()) {
+      std::vector<std::string> names;
+      for (const NovelFrame& frame : frames) names.push_back(FileOf(frame));
+      folder_.emplace(output_, "frames", names, request.force);
     }
   }
   std::string Add(const NovelFrame& camera, const RenderResult& result, bool filled) {
@@ -37,7 +41,7 @@ class FrameSink {
       video_->Add(result.image);
       return output_.string();
     }
-    const fs::path file = several_ ? output_ / (camera.name + ".png") : output_;
+    const fs::path file = folder_ ? output_ / FileOf(camera) : output_;
     // What no view saw is black with alpha 0, unless it was filled.
     if (filled || LowerExtension(file) != ".png") {
       io::WriteImage(file, result.image);
@@ -48,11 +52,14 @@ class FrameSink {
   }
   void Finish(const Progress& progress) {
     if (video_) video_->Finish(progress);
+    if (folder_) folder_->Finish();
   }
 
  private:
+  static std::string FileOf(const NovelFrame& frame) { return frame.name + ".png"; }
+
   fs::path output_;
-  bool several_;
+  std::optional<OutputFolder> folder_;
   std::optional<io::VideoWriter> video_;
 };
 
@@ -121,7 +128,7 @@ RenderReport Render(const RenderRequest& request,
   moving.At(shown(0));  // names are checked here
 
   RenderReport report;
-  FrameSink sink(request.output, request.several());
+  FrameSink sink(request, cameras);
   progress.Stage("rendering", static_cast<int>(cameras.size()));
   for (size_t i = 0; i < cameras.size(); ++i) {
     progress.ThrowIfInterrupted();

@@ -35,6 +35,7 @@ struct RenderRequest {
   std::filesystem::path depth_out;     ///< one frame: its depth as float EXR; empty: none
   std::filesystem::path coverage_out;  ///< one frame: what some view saw as PNG; empty: none
   RenderOptions render;
+  bool force = false;          ///< images of several frames may replace files
   bool measured_only = false;  ///< drawn without completed depth
   double memory_gb = 4;        ///< for the views' pixels; others are dropped and read again
   int threads = 0;

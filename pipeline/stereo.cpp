@@ -18,6 +18,7 @@
 #include "pipeline/detail/reports/prior_json.h"
 #include "pipeline/detail/reports/text.h"
 #include "pipeline/detail/run/finishing.h"
+#include "pipeline/detail/run/output_folder.h"
 #include "pipeline/detail/run/recorded_notes.h"
 #include "pipeline/detail/run/run_log.h"
 #include "pipeline/validate.h"
@@ -101,6 +102,10 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
                                       {"set_sha256", Sha256OfFile(options.set / "set.json")},
                                       {"held_out", HeldOutHashes(set)}};
   io::SetWriter writer(report.written, fingerprint.dump(), in_place || options.force);
+  // What an earlier run delivered before it was cut off is in the way of nobody.
+  if (!options.normals.empty() && !options.force && !writer.resumed()) {
+    RequireFree(options.normals, NormalFileNames(set));
+  }
   CopyImages(options.set, set, options.threads, writer, progress);
   const DepthStageResult stage =
       DepthStage(set, sparse, options.depth, quality,

@@ -6,6 +6,7 @@
 
 #include "calib/colmap/sqlite_file.h"
 #include "calib/colmap/workspace.h"
+#include "dtr/base/delete.h"
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 
@@ -87,16 +88,14 @@ void ForEachMatchedPair(const std::filesystem::path& database,
 }
 
 void RemoveDatabase(const std::filesystem::path& database) {
-  for (const char* part : {"", "-wal", "-shm", "-journal"}) RemoveAll(database.string() + part);
+  for (const char* part : {"", "-wal", "-shm", "-journal"}) RemoveTree(database.string() + part);
 }
 
 void CopyDatabase(const std::filesystem::path& from, const std::filesystem::path& to) {
   RemoveDatabase(to);
   for (const char* part : {"", "-wal"}) {
     if (*part != '\0' && !std::filesystem::exists(from.string() + part)) continue;
-    std::error_code failure;
-    std::filesystem::copy_file(from.string() + part, to.string() + part, failure);
-    if (failure) throw Error(to.string() + part + ": cannot be written: " + failure.message());
+    CopyFileAtomically(from.string() + part, to.string() + part);
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include "calib/colmap/database.h"
 #include "calib/colmap/graph_database.h"
+#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 
 namespace dtr::colmap {
@@ -57,7 +58,7 @@ std::optional<sfm::Features> FeatureParts::Of(std::uint32_t image_id) const {
 }
 
 void FeatureParts::Remove() const {
-  for (const fs::path& file : FilesOfParts(database_)) RemoveAll(file);
+  for (const fs::path& file : FilesOfParts(database_)) RemoveTree(file);
 }
 
 }  // namespace dtr::colmap

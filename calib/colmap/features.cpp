@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "calib/colmap/database.h"
+#include "dtr/base/delete.h"
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/memory_budget.h"
@@ -248,7 +249,7 @@ void ExtractFeaturesResumably(Workspace& workspace, const std::filesystem::path&
   const size_t kept = std::filesystem::exists(database) ? workspace.Kept(note).value_or(0) : 0;
   if (kept == 0) {
     // A note must never meet features of other photos: it goes before a new database comes.
-    RemoveAll(note);
+    RemoveTree(note);
     SyncFolder(note.parent_path());
     RemoveDatabase(database);  // COLMAP would take over what it holds
   }

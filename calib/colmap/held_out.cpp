@@ -16,6 +16,7 @@
 #include "calib/colmap/sfm_steps.h"
 #include "calib/lens_groups.h"
 #include "calib/sfm/registration/register_view.h"
+#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/parallel_for.h"
@@ -125,8 +126,8 @@ void MatchWithSources(Workspace& workspace, const Frozen& frozen, SmallSources& 
 void Register(Workspace& workspace, const Frozen& frozen, const SfmOptions& options,
               std::optional<std::uint32_t> camera_id) {
   const fs::path input = workspace.folder() / "source", output = workspace.folder() / "registered";
-  RemoveAll(input);
-  RemoveAll(output);
+  RemoveTree(input);
+  RemoveTree(output);
   MakeFolder(output);
   WriteAliased(input, frozen, camera_id);
   Arguments arguments(workspace.program(), "image_registrator");
@@ -138,14 +139,14 @@ void Register(Workspace& workspace, const Frozen& frozen, const SfmOptions& opti
       .Add({"Mapper.num_threads"}, "1");
   if (frozen.forward_motion) AllowForwardMotion(arguments);
   workspace.Run(arguments, nullptr);
-  RemoveAll(input);  // a copy of the frozen model per photo would fill the disk
+  RemoveTree(input);  // a copy of the frozen model per photo would fill the disk
 }
 
 // The photo's pose by calib/sfm, as a model of it alone in registered/; none there: it has no pose.
 void RegisterHere(Workspace& workspace, const Frozen& frozen, SmallSources& small,
                   const CameraGroup& group, const ExtractionPlan& plan, std::uint64_t seed) {
   const fs::path output = workspace.folder() / "registered";
-  RemoveAll(output);
+  RemoveTree(output);
   std::map<std::string, const calib::SfmImage*> image_called;
   for (const calib::SfmImage& image : frozen.model.images) image_called[image.name] = &image;
   std::vector<sfm::SourceView> sources;
@@ -237,13 +238,13 @@ Placed Place(const fs::path& images_dir, const SfmImageInput& photo, const Froze
 
 std::string FingerprintOf(const calib::SfmModel& model, const fs::path& folder) {
   const fs::path copy = folder / "frozen";
-  RemoveAll(copy);
+  RemoveTree(copy);
   WriteModel(copy, model, Format::kBinary);
   std::string text;
   for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"}) {
     text += Sha256OfFile(copy / name);
   }
-  RemoveAll(copy);
+  RemoveTree(copy);
   return text;
 }
 

@@ -11,6 +11,7 @@
 #include "calib/colmap/sfm_steps.h"
 #include "calib/colmap/view_pyramids.h"
 #include "calib/sfm/mapping/triangulate.h"
+#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
 
@@ -143,7 +144,7 @@ void RequireMatches(const Workspace& workspace, const KnownCameras& known) {
 
 void Triangulate(Workspace& workspace, const KnownCameras& known, const SfmOptions& options) {
   const fs::path input = workspace.folder() / "posed", output = workspace.folder() / "triangulated";
-  for (const fs::path& folder : {input, output, workspace.folder() / "model"}) RemoveAll(folder);
+  for (const fs::path& folder : {input, output, workspace.folder() / "model"}) RemoveTree(folder);
   MakeFolder(output);
   workspace.WriteModelHere(input, NumberedAsInDatabase(workspace, known));
   Arguments arguments(workspace.program(), "point_triangulator");
@@ -181,7 +182,7 @@ void Triangulate(Workspace& workspace, const KnownCameras& known, const SfmOptio
 
 // As Triangulate, by calib/sfm.
 void TriangulateHere(Workspace& workspace, const KnownCameras& known) {
-  RemoveAll(workspace.folder() / "model");
+  RemoveTree(workspace.folder() / "model");
   RequireMatches(workspace, known);
   workspace.progress().Stage("triangulation", 0);
   workspace.RunHere([&] {

@@ -82,11 +82,13 @@ void Put(std::string& out, T value) {
   out.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
+constexpr char kUnfinished[] = "model.partial";
+
 // A full disk is met before any file bears its name. The cameras come last: where they are, a model
 // is, also after a kill.
 void WriteFiles(const fs::path& folder, const std::string& extension, const std::string& cameras,
                 const std::string& images, const std::string& points) {
-  const WorkFolder work(folder / "model.partial", "model");
+  const WorkFolder work(folder / kUnfinished, "model");
   const std::pair<std::string, const std::string*> files[] = {
       {"images", &images}, {"points3D", &points}, {"cameras", &cameras}};
   for (const auto& [stem, content] : files) {
@@ -272,6 +274,15 @@ std::map<std::uint32_t, calib::LensCamera> ReadCamerasText(const fs::path& file)
 void WriteCamerasText(const fs::path& file,
                       const std::map<std::uint32_t, calib::LensCamera>& cameras) {
   WriteFileAtomically(file, CamerasText(cameras));
+}
+
+void RequireNoModel(const fs::path& folder) {
+  for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"}) {
+    const bool is_whole = std::string(name) == "cameras.bin";
+    if (!fs::exists(folder / name) || (!is_whole && fs::exists(folder / kUnfinished))) continue;
+    throw UsageError(folder.string() +
+                     ": expected no model yet, found one; remove it or choose another folder");
+  }
 }
 
 }  // namespace dtr::colmap

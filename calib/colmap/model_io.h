@@ -33,6 +33,10 @@ std::filesystem::path ModelFolderIn(const std::filesystem::path& folder);
 /// the other format, or when a file cannot be written.
 void WriteModel(const std::filesystem::path& folder, const calib::SfmModel& model, Format format);
 
+/// Throws UsageError where `folder` holds a binary model, or files of one that are not what a write
+/// that was cut off left.
+void RequireNoModel(const std::filesystem::path& folder);
+
 /// The cameras of a cameras.txt alone, by id. Throws Error as ReadModel does.
 std::map<std::uint32_t, calib::LensCamera> ReadCamerasText(const std::filesystem::path& file);
 

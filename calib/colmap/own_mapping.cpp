@@ -14,6 +14,7 @@
 #include "calib/colmap/parallax.h"
 #include "calib/colmap/sfm_steps.h"
 #include "calib/sfm/mapping/model_check.h"
+#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 
@@ -260,8 +261,8 @@ std::vector<calib::SfmModel> MapOrFallBack(
                                    : "the global mapper's model is taken");
   }
   if (!take) {  // what COLMAP's attempts left says nothing of our model
-    RemoveAll(workspace.folder() / kFixedIntrinsicsNote);
-    RemoveAll(workspace.folder() / kForwardMotionNote);
+    RemoveTree(workspace.folder() / kFixedIntrinsicsNote);
+    RemoveTree(workspace.folder() / kForwardMotionNote);
   }
   WriteNote(workspace, ours, take, why);
   if (take) return colmaps;

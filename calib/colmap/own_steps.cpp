@@ -16,6 +16,7 @@
 #include "calib/sfm/mapping/global_mapper.h"
 #include "calib/sfm/matching/match_photos.h"
 #include "calib/sfm/matching/pair_journal.h"
+#include "dtr/base/delete.h"
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -175,7 +176,7 @@ size_t KeptOrNew(Workspace& workspace, const fs::path& database,
   const size_t kept = fs::exists(database) ? workspace.Kept(note).value_or(0) : 0;
   if (kept > 0) return kept;
   // A note must never meet features of other photos: it goes before a new database comes.
-  RemoveAll(note);
+  RemoveTree(note);
   SyncFolder(note.parent_path());
   RemoveDatabase(database);  // with the journal of a killed write, which SQLite would play back
   const fs::path working = database.string() + ".working";

@@ -16,6 +16,7 @@
 #include "calib/colmap/without_camera.h"
 #include "calib/sfm/mapping/model_check.h"
 #include "calib/sfm/mapping/triangulate.h"
+#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/parallel_for.h"
@@ -110,7 +111,7 @@ std::vector<calib::SfmModel> ModelsIn(const Workspace& workspace, const fs::path
 
 std::vector<calib::SfmModel> MadeIn(Workspace& workspace, const fs::path& models,
                                     const SfmOptions& options, Mapping mapping) {
-  RemoveAll(models);
+  RemoveTree(models);
   MakeFolder(models);
   if (options.intrinsics_are_known && mapping == Mapping::kFree) {
     mapping = Mapping::kFixedIntrinsics;
@@ -172,7 +173,7 @@ std::vector<calib::SfmModel> MadeByColmap(Workspace& workspace,
 void MappingStep(Workspace& workspace, const std::vector<CameraGroup>& groups,
                  const SfmOptions& options) {
   for (const char* part : {"model", kForwardMotionNote, kFixedIntrinsicsNote, kOwnMappingNote}) {
-    RemoveAll(workspace.folder() / part);
+    RemoveTree(workspace.folder() / part);
   }
   const auto by_colmap = [&] { return MadeByColmap(workspace, groups, options); };
   const std::vector<calib::SfmModel> made =
@@ -190,7 +191,7 @@ void FixedMappingStep(Workspace& workspace, const std::vector<CameraGroup>& grou
                       const SfmOptions& options) {
   const fs::path models = workspace.folder() / "fixed" / "models",
                  model = workspace.folder() / kFixedModel;
-  RemoveAll(model);
+  RemoveTree(model);
   if (options.engine != SfmEngine::kColmap) {
     const GloballyMapped mapped = MapHere(workspace, options, LensesOf(workspace, groups));
     if (mapped.why_not.empty() && !mapped.model.images.empty()) {

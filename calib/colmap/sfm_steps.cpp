@@ -8,6 +8,7 @@
 #include "calib/colmap/database.h"
 #include "calib/colmap/matching.h"
 #include "calib/colmap/own_steps.h"
+#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 
@@ -78,7 +79,7 @@ void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& gr
     const bool go_on = fs::exists(begun) && fs::exists(workspace.database()) &&
                        ReadFile(begun, kLargestStepNote) == workspace.fingerprint();
     if (!go_on) {
-      RemoveAll(begun);
+      RemoveTree(begun);
       CopyDatabase(features, workspace.database());
       WriteFileAtomically(begun, workspace.fingerprint());
     }

@@ -99,8 +99,6 @@ class Workspace {
 /// Writes `report` as sfm_run.json into `folder`.
 void WriteReport(const std::filesystem::path& folder, const SfmReport& report);
 
-/// Removes a file or folder tree that a step is about to make again.
-void RemoveAll(const std::filesystem::path& path);
 /// Makes a folder with its parents. Throws Error when it cannot.
 void MakeFolder(const std::filesystem::path& path);
 

@@ -206,7 +206,9 @@ void AddBatchCommand(CLI::App& app) {
                  options.directory = fs::current_path();
                  options.program = ThisProgram();
                  options.threads = context.common.threads;
-                 ReadBuildWords(batch->remaining(), context.common, options);
+                 std::vector<std::string> words = batch->remaining();
+                 if (context.common.force) words.emplace_back("--force");
+                 ReadBuildWords(words, context.common, options);
                  return Run(context, *arguments);
                };
              });

@@ -396,6 +396,18 @@ void AddSweepOptions(CLI::App& command, CLI::Option* table, SweepRequest& reques
       ->type_name("DIR");
 }
 
+// Results are written over those of an earlier run of this command, and over nothing else.
+void RequireOwnFolder(const fs::path& folder) {
+  if (fs::exists(folder / kWorkFile)) return;
+  for (const char* name : {kSweepFile, "bench.csv", "bench.html"}) {
+    if (!fs::exists(folder / name)) continue;
+    throw UsageError(fmt::format(
+        "-o {}: holds a file {} that is of no unfinished sweep; choose another folder or give "
+        "--force",
+        folder.string(), name));
+  }
+}
+
 int RunSweep(const SweepRequest& request, const Context& context) {
   if (request.point.empty()) context.console.KeepsWork();
   Check(request);
@@ -407,9 +419,10 @@ int RunSweep(const SweepRequest& request, const Context& context) {
   std::optional<TemporaryFolder> scratch;  // a single point leaves nothing behind
   if (one_point) scratch.emplace();
   const fs::path output = one_point ? scratch->path() : OutputFolder(request);
+  if (!one_point && !context.common.force) RequireOwnFolder(output);
   fs::create_directories(output);
   std::optional<SweepFile> file;
-  if (!one_point) file.emplace(output / "work.json");
+  if (!one_point) file.emplace(output / kWorkFile);
   for (const std::string& name : request.stages) {
     const auto measurable = MakeStage(name, request, context, output, *renderer);
     run.stages.push_back(

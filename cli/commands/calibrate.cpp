@@ -34,11 +34,7 @@ struct CalibrateArguments {
 int RunCalibratePhotos(const CalibrateArguments& options, const Context& context) {
   context.console.KeepsWork();
   const pipeline::MetreOptions metres = MetreOptionsFrom(options.gps, options.metres);
-  if (fs::exists(options.output / "cameras.bin")) {
-    throw UsageError(
-        fmt::format("{}: expected no model yet, found one; remove it or choose another folder",
-                    options.output.string()));
-  }
+  colmap::RequireNoModel(options.output);
   pipeline::CalibrateOptions calibrate;
   // Before any photo is read: what is missing or wrong must not cost their time.
   if (!options.lens.empty()) calibrate.lens = pipeline::ReadLens(options.lens);

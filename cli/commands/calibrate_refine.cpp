@@ -63,11 +63,7 @@ void WriteRefined(const CalibrateRefineArguments& options, const std::filesystem
 }
 
 int RunRefine(const CalibrateRefineArguments& options, const Context& context) {
-  if (std::filesystem::exists(options.output / "cameras.bin")) {
-    throw UsageError(
-        fmt::format("{}: expected no model yet, found one; remove it or choose another folder",
-                    options.output.string()));
-  }
+  colmap::RequireNoModel(options.output);
   const pipeline::MetreOptions metres = MetreOptionsFrom(!options.gps.empty(), options.metres);
   const std::filesystem::path model_folder = colmap::ModelFolderIn(options.model);
   const calib::SfmModel model = colmap::ReadModel(model_folder);

@@ -92,6 +92,7 @@ int RunFormat(Request request, const Format& format, const Context& context) {
   if (!format.extensions.empty()) RequireOutputFile(request.output, "-o", format.extensions);
   if (!std::filesystem::exists(request.output)) RequireFolderOf(request.output, "-o");
   request.threads = context.common.threads;
+  request.force = context.common.force;
   const pipeline::ExportReport report = format.write(request, context.console);
   context.console.Say(Summary(request, format, report));
   nlohmann::ordered_json json{{"format", format.name}, {"images", report.images}};
@@ -113,6 +114,7 @@ int RunWeb(pipeline::WebPageRequest request, const Context& context) {
   } else {
     RequireOutputFile(request.output, "-o", {".html", ".htm"});
   }
+  request.force = context.common.force;
   const pipeline::WebPageReport report = pipeline::ExportWebPage(request, context.console);
   if (!report.warning.empty()) context.console.Note(report.warning);
   const std::string photos = report.jpeg_quality > 0

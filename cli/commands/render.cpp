@@ -53,6 +53,7 @@ int RunRender(const RenderArguments& options, const Context& context) {
   pipeline::RenderRequest request = options.request;
   request.render = *options.render;
   request.threads = context.common.threads;
+  request.force = context.common.force;
   const pipeline::RenderReport report = pipeline::Render(
       request,
       [&] {

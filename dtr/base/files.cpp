@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <cstring>
 
+#include "dtr/base/delete.h"
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/regular_file.h"
@@ -17,7 +18,7 @@ namespace {
 
 // A new file: whatever an earlier process of our number left under its name goes first.
 void WriteNew(const fs::path& file, std::string_view content) {
-  unlink(file.c_str());
+  TryRemoveFile(file);
   const OpenFile out(file, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW, 0644);
   WriteAll(out, content);
   Done(fsync(out.fd()));
@@ -92,7 +93,7 @@ void WriteFileAtomically(const fs::path& file, std::string_view content) {
       WriteNew(temporary, content);
       Done(rename(temporary.c_str(), target.c_str()));
     } catch (const std::system_error&) {
-      unlink(temporary.c_str());
+      TryRemoveFile(temporary);
       throw;
     }
   } catch (const std::system_error& failure) {

@@ -23,4 +23,17 @@ bool IsUtf8(const std::string& text) {
   return true;
 }
 
+std::string WithoutDirectionMarks(std::string text) {
+  // U+202A...U+202E and U+2066...U+2069: three bytes each.
+  for (size_t at = text.find("\xe2"); at != std::string::npos; at = text.find("\xe2", at + 1)) {
+    if (at + 2 >= text.size()) break;
+    const auto second = static_cast<unsigned char>(text[at + 1]);
+    const auto third = static_cast<unsigned char>(text[at + 2]);
+    const bool turns = (second == 0x80 && third >= 0xaa && third <= 0xae) ||
+                       (second == 0x81 && third >= 0xa6 && third <= 0xa9);
+    if (turns) text.replace(at, 3, "\xef\xbf\xbd");
+  }
+  return text;
+}
+
 }  // namespace dtr

@@ -10,6 +10,7 @@
 #include <jpeglib.h>  // needs cstdio before it
 
 #include "dtr/base/error.h"
+#include "dtr/base/utf8.h"
 
 namespace dtr::report {
 namespace {
@@ -65,7 +66,9 @@ std::string Base64(std::string_view bytes) {
   return text;
 }
 
-std::string EscapeHtml(std::string_view text) {
+std::string EscapeHtml(std::string_view given) {
+  const std::string shown = WithoutDirectionMarks(std::string(given));
+  std::string_view text = shown;
   std::string escaped;
   escaped.reserve(text.size());
   while (!text.empty()) {

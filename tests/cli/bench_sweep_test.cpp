@@ -233,5 +233,12 @@ TEST_F(BenchSweep, WhatCannotBeMeasuredIsRejected) {
                  "--table excludes --point");
 }
 
+TEST_F(BenchSweep, ASweepReplacesNoResultsOfOthers) {
+  fs::create_directories(folder_ / "out");
+  WriteFileAtomically(folder_ / "out/bench.csv", "mine");
+  ExpectRejected(Dtr(Sweep("1")), kWrongUsage, "that is of no unfinished sweep");
+  EXPECT_EQ(Text(folder_ / "out/bench.csv"), "mine");
+}
+
 }  // namespace
 }  // namespace dtr::testing

@@ -49,6 +49,12 @@ TEST(EscapeHtml, HostileTextBecomesHarmless) {
             "caf\xC3\xA9 \xE6\x97\xA5 \xF0\x9F\x93\xB7");
   const std::string bad = "\xEF\xBF\xBD";
   EXPECT_EQ(EscapeHtml("\xff"), bad);
+  // What would show "a<RLO>gpj.exe" as "aexe.jpg"; a dash of the same first bytes stays.
+  EXPECT_EQ(EscapeHtml("a\xE2\x80\xAEgpj"), "a" + std::string(bad) + "gpj");
+  EXPECT_EQ(EscapeHtml("a\xE2\x80\x93"
+                       "b"),
+            "a\xE2\x80\x93"
+            "b");
   EXPECT_EQ(EscapeHtml("\xC3"), bad);                      // cut short
   EXPECT_EQ(EscapeHtml("\xC0\xBC"), bad + bad);            // overlong '<'
   EXPECT_EQ(EscapeHtml("\xED\xA0\x80"), bad + bad + bad);  // surrogate

@@ -6,6 +6,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "dtr/base/utf8.h"
 #include "viewer/web/web_files.h"
 
 namespace dtr::web {
@@ -31,6 +32,7 @@ std::string WithoutTags(std::string json) {
 }
 
 std::string EscapedHtml(std::string text) {
+  text = WithoutDirectionMarks(std::move(text));
   ReplaceAll(text, "&", "&amp;");
   ReplaceAll(text, "<", "&lt;");
   ReplaceAll(text, ">", "&gt;");

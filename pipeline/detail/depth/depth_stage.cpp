@@ -104,6 +104,8 @@ std::string HashOf(std::span<const stereo::StereoView> views, const SparseScene&
   return Sha256(std::as_bytes(std::span(values)));
 }
 
+std::string NormalFileOf(const View& view) { return view.id + ".exr"; }
+
 // Normals beside the checkpoints of this very run until all are there: what lies in the user's
 // folder may be of another.
 class NormalFiles {
@@ -111,22 +113,21 @@ class NormalFiles {
   NormalFiles(const std::filesystem::path& work, const std::filesystem::path& folder)
       : work_(work / "normals"), folder_(folder) {}
 
-  bool Has(const View& view) const { return folder_.empty() || exists(work_ / Name(view)); }
+  bool Has(const View& view) const { return folder_.empty() || exists(work_ / NormalFileOf(view)); }
   void Write(const View& view, const stereo::PlaneMap& planes,
              const stereo::DepthEstimate& estimate) const {
     std::filesystem::create_directories(work_);
     io::WriteExrOfVectors(
-        work_ / Name(view),
+        work_ / NormalFileOf(view),
         stereo::NormalsOf(planes, estimate.depth, estimate.inverse_depth_sigma, view.camera));
   }
   void Deliver(const View& view) const {
-    if (folder_.empty() || !exists(work_ / Name(view))) return;
+    if (folder_.empty() || !exists(work_ / NormalFileOf(view))) return;
     std::filesystem::create_directories(folder_);
-    CopyFileAtomically(work_ / Name(view), folder_ / Name(view));
+    CopyFileAtomically(work_ / NormalFileOf(view), folder_ / NormalFileOf(view));
   }
 
  private:
-  static std::string Name(const View& view) { return view.id + ".exr"; }
   std::filesystem::path work_, folder_;
 };
 
@@ -146,6 +147,18 @@ void WriteDepth(View& view, stereo::DepthEstimate&& estimate, LengthUnit unit,
   view.depth = {};
   view.inverse_depth_sigma.reset();
 }
+
+}  // namespace
+
+std::vector<std::string> NormalFileNames(const DtrSet& set) {
+  std::vector<std::string> names;
+  for (const View& view : set.frames.front().views) {
+    if (view.role == ViewRole::kSource) names.push_back(NormalFileOf(view));
+  }
+  return names;
+}
+
+namespace {
 
 // The effort that fits into the time budget, by a probe with as many neighbours as any effort asks.
 stereo::QualitySettings WithinBudget(std::span<const stereo::StereoView> views,

@@ -57,6 +57,9 @@ struct DepthStageResult {
   std::string planes_made_from;
 };
 
+/// Names of the files in DepthStageOptions::normals: of every source view.
+std::vector<std::string> NormalFileNames(const DtrSet& set);
+
 /// Writes the pixels of a view, or finds them written by an earlier, interrupted run, and frees
 /// them.
 void StoreImage(View& view, LengthUnit unit, io::SetWriter& writer);

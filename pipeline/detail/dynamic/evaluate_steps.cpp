@@ -10,11 +10,11 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/quiet_progress.h"
-#include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/time_steps.h"
 #include "pipeline/detail/boards/rig_names.h"
 #include "pipeline/detail/boards/rig_timestamps.h"
+#include "pipeline/detail/reports/comparison_images.h"
 #include "pipeline/evaluate_depth.h"
 
 namespace dtr::pipeline {
@@ -154,6 +154,7 @@ EvaluateResult EvaluateSteps(const EvaluateRequest& request, const DtrSet& descr
   const bool has_held_out = std::any_of(
       views.begin(), views.end(), [](const View& view) { return view.role == ViewRole::kHeldOut; });
   if (!has_held_out && truths.empty()) RequireOneFrame(described);
+  ComparisonImages images(request, described);
   MeansOverTime means;
   DepthScorers scorers;
   std::map<std::string, eval::ViewFlicker> flicker;
@@ -172,18 +173,13 @@ EvaluateResult EvaluateSteps(const EvaluateRequest& request, const DtrSet& descr
       eval::EvaluateOptions evaluate;
       evaluate.render = request.render;
       evaluate.render.threads = request.threads;
-      if (!request.images.empty()) {
-        fs::create_directories(request.images);
-        evaluate.on_rendered = [&](const View& view, const RenderResult& filled) {
-          io::WriteImage(request.images / (view.id + ".png"),
-                         eval::ComparisonImage(filled.image, view.image, view.mask));
-        };
-      }
+      evaluate.on_rendered = images.Writer();
       // Renderers know views by where they are in memory: every time step has one of its own.
       means.Add(eval::EvaluateHeldOut(set, evaluate, make_renderer(), quiet));
     }
     progress.Update(static_cast<int>(step) + 1);
   }
+  images.Finish();
   EvaluateResult result;
   result.time_steps = described.frames.size();
   result.views = means.Report();

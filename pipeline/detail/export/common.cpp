@@ -10,6 +10,7 @@
 #include "dtr/base/work_folder.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/validation_result.h"
+#include "pipeline/detail/run/output_folder.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -33,10 +34,7 @@ std::vector<std::string> NamesWith(const std::vector<View>& views,
 }  // namespace
 
 DtrSet SetToExport(const ExportRequest& request, const char* format, Progress& progress) {
-  const fs::path output = WithoutTrailingSlash(request.output);
-  if (fs::exists(output)) {
-    throw UsageError(fmt::format("{}: exists already; choose another name", output.string()));
-  }
+  RequireNew(WithoutTrailingSlash(request.output), request.force);
   DtrSet set = io::ReadSet(request.set);
   if (set.frames.size() != 1) {
     throw Error(fmt::format(
