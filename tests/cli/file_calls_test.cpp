@@ -80,12 +80,13 @@ std::vector<WritingCommand> AllCommands() {
   all.push_back({.name = "build", .words = "build" + build});
   all.push_back({.name = "build_from_photos",
                  .words = "build OF/courtyard/images -o IN/set.dtr --sfm colmap --engine none"});
-  all.push_back({.name = "batch", .words = "batch --local 1" + build});
+  all.push_back({.name = "batch",
+                 .words = "batch --local 1 OF/courtyard/images -o IN/set.dtr --poses "
+                          "OF/courtyard/sparse --engine none"});
   all.push_back(
       {.name = "stereo_with_normals",
        .words = "stereo OF/cameras.dtr -o IN/set.dtr --preset fast --normals IN/normals"});
-  all.push_back({.name = "export_web",
-                 .words = "export OF/good.dtr --format web -o IN/page.html"});
+  all.push_back({.name = "export_web", .words = "export OF/good.dtr --format web -o IN/page.html"});
   return all;
 }
 

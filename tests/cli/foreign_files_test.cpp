@@ -50,7 +50,7 @@ std::vector<std::string> With(std::vector<std::string> words, std::vector<std::s
 
 TEST_F(ForeignFiles, FoldersBehindLinksInWorkFoldersAreLeftAlone) {
   const std::string rejected = "work in progress must not be a symbolic link";
-  for (const std::string& inside : {"", "/work", "/images", "/work/views", "/work/calibration"}) {
+  for (const std::string inside : {"", "/work", "/images", "/work/views", "/work/calibration"}) {
     const fs::path link = In("n.dtr.partial" + inside);
     fs::remove_all(In("n.dtr.partial"));
     fs::create_directories(link.parent_path());
@@ -66,9 +66,10 @@ TEST_F(ForeignFiles, FoldersBehindLinksInWorkFoldersAreLeftAlone) {
     fs::remove(In(beside));
   }
   // Work of captures, exports and datasets is cleared, not continued.
-  for (const auto& words : {std::vector<std::string>{"capture", Photos()},
-                            {"export", Shared("good.dtr")},
-                            {"dataset", "make", "plane"}}) {
+  for (const auto& words :
+       {std::vector<std::string>{"capture", Photos()},
+        {"export", Shared("good.dtr")},
+        {"dataset", "make", "plane", "--views", "3", "--width", "96", "--height", "64"}}) {
     fs::create_directory_symlink(In("user"), In("n.partial"));
     ExpectRejected(Dtr(With(words, {"-o", In("n")})), kWrongUsage, "found something else");
     ExpectUntouched();
@@ -91,7 +92,7 @@ TEST_F(ForeignFiles, ASetBehindALinkIsReplacedWhereItIsAndTheLinkStays) {
   EXPECT_TRUE(fs::is_symlink(In("link.dtr")));
   EXPECT_TRUE(fs::is_directory(real));
   DtrOk({"info", real.string(), "--verify"});
-  DtrOk({"stereo", In("link.dtr"), "--engine", "sgbm"});
+  DtrOk({"calibrate", "scale", In("link.dtr"), "--distance", "0001,0006=2m"});
   EXPECT_TRUE(fs::is_symlink(In("link.dtr")));
   DtrOk({"info", real.string(), "--verify"});
   EXPECT_EQ(FilesIn(folder_.path()), 0);
@@ -217,10 +218,11 @@ TEST_F(ForeignFiles, FramesAndComparisonsReplaceNoFileOfTheirFolder) {
 }
 
 TEST_F(ForeignFiles, APipeInThePlaceOfAFileOfASetKeepsNobodyWaiting) {
-  for (const std::string& file : {"mesh/0001.bin", "images/0001.png", "sparse.bin", "set.json",
-                                  "report/run.json", "held_out/files.json"}) {
+  for (const std::string file : {"mesh/0001.bin", "images/0001.png", "sparse.bin", "set.json",
+                                 "report/run.json", "held_out/files.json"}) {
     fs::remove_all(In("s.dtr"));
     const fs::path place = CopyOfSet("s.dtr") / file;
+    fs::create_directories(place.parent_path());
     fs::remove(place);
     ASSERT_EQ(mkfifo(place.c_str(), 0600), 0);
     const std::string set = In("s.dtr");
