@@ -218,12 +218,14 @@ TEST_F(ForeignFiles, FramesAndComparisonsReplaceNoFileOfTheirFolder) {
 }
 
 TEST_F(ForeignFiles, APipeInThePlaceOfAFileOfASetKeepsNobodyWaiting) {
+  DtrOk({"build", Photos(), "-o", In("meshes.dtr"), "--poses", Shared("courtyard/sparse"),
+         "--preset", "fast"});
   for (const std::string file : {"mesh/0001.bin", "images/0001.png", "sparse.bin", "set.json",
-                                 "report/run.json", "held_out/files.json"}) {
+                                 "report/run.json", "depth/0001.png"}) {
     fs::remove_all(In("s.dtr"));
-    const fs::path place = CopyOfSet("s.dtr") / file;
-    fs::create_directories(place.parent_path());
-    fs::remove(place);
+    fs::copy(In("meshes.dtr"), In("s.dtr"), fs::copy_options::recursive);
+    const fs::path place = fs::path(In("s.dtr")) / file;
+    ASSERT_TRUE(fs::remove(place)) << file;
     ASSERT_EQ(mkfifo(place.c_str(), 0600), 0);
     const std::string set = In("s.dtr");
     const Ran verified = Dtr({"info", set, "--verify"});
