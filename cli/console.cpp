@@ -50,6 +50,8 @@ std::string TimeLeft(double spent_s, double share) {
 void CatchInterrupts() {
   signal(SIGINT, OnInterrupt);
   signal(SIGTERM, OnInterrupt);
+  // A terminal that is lost; nohup ignores it.
+  if (signal(SIGHUP, OnInterrupt) == SIG_IGN) signal(SIGHUP, SIG_IGN);
 }
 
 Console::Console(bool json_on_stdout)

@@ -219,14 +219,14 @@ void MakeDataset(const DatasetSpec& given, const fs::path& given_folder, int thr
   const fs::path out_folder = WithoutTrailingSlash(given_folder);
   DatasetSpec spec = given;
   CheckSpec(spec);
-  if (spec.steps > 1) {
-    MakeDynamicDataset(spec, out_folder, threads, progress);
-    return;
-  }
-  if (fs::exists(out_folder)) {
+  if (WorkFolder::IsTaken(out_folder, "dataset")) {
     throw UsageError(out_folder.string() +
                      ": expected a folder that does not exist yet; remove "
                      "it or choose another name");
+  }
+  if (spec.steps > 1) {
+    MakeDynamicDataset(spec, out_folder, threads, progress);
+    return;
   }
   const Scene scene = MakeScene(spec.scene, spec.seed, spec.time_s);
   if (spec.layout.empty()) spec.layout = scene.framing().layouts.front();

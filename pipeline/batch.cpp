@@ -9,8 +9,10 @@
 #include "capture/ingest.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/io/hand_over.h"
 #include "dtr/io/set_io.h"
 #include "pipeline/detail/batch/batch_files.h"
+#include "pipeline/detail/batch/batch_folder.h"
 #include "pipeline/detail/batch/local.h"
 #include "pipeline/detail/batch/slurm.h"
 #include "pipeline/detail/reports/text.h"
@@ -141,6 +143,28 @@ BatchState StateOf(const Batch& batch) {
   return state;
 }
 
+void DryRun(Batch& batch, const std::function<void(const std::string&)>& say) {
+  if (batch.local == 0) return SubmitToSlurm(batch, true, say);
+  for (const BatchStage& stage : batch.stages) {
+    say(fmt::format("{}: {} parts", stage.name, stage.parts));
+  }
+}
+
+// A record decides nothing about what is run; another version rejects the parts of this one.
+void NoteProgram(const Batch& before, const Batch& batch, Progress& progress) {
+  if (before.program == batch.program) return;
+  progress.Note(fmt::format("{}: names the program {}; {} goes on with it",
+                            BatchFolder(batch.set).string(), before.program.string(),
+                            batch.program.string()));
+}
+
+[[noreturn]] void RejectMissingSet(const Batch& batch) {
+  throw Error(fmt::format(
+      "{}: expected the set, as all of its parts ended well, found none; look into {}, then do "
+      "dtr batch resume",
+      batch.set.string(), LogOf(batch, batch.stages.back(), 0).string()));
+}
+
 }  // namespace
 
 std::string ToJson(const BatchState& state) {
@@ -163,38 +187,47 @@ std::string ToJson(const BatchState& state) {
 BatchState RunBatch(const BatchOptions& options, const std::function<void(const std::string&)>& say,
                     Progress& progress) {
   Batch batch = Planned(options);
+  if (const auto warning = RequireOwnBatch(batch.set); !warning.empty()) progress.Note(warning);
+  std::optional<FileLock> lock;
   std::optional<Batch> before;
-  if (HasBatch(batch.set)) before = LoadBatch(batch.set);
+  if (HasBatch(batch.set)) {
+    LoadBatch(batch.set);  // rejects a record that is none before anything is written beside it
+    if (!options.dry_run) lock = LockBatch(batch.set);
+    before = LoadBatch(batch.set);
+  }
   const bool was_finished = before && MissingParts(*before, before->stages.back()).empty();
-  if (was_finished && options.resumes) return StateOf(*before);
+  if (was_finished && options.resumes) {
+    if (!options.dry_run) io::Recover(batch.set);
+    return StateOf(*before);
+  }
   if (before && !was_finished) RequireNoneUnderWay(*before);
   if (before && !was_finished && fs::exists(io::SetWriter::WorkFolderOf(batch.set))) {
     KeepParts(*before, batch);
   } else {
     io::SetWriter::RequireTarget(options.build.output, options.build.force);
   }
-  if (options.local > 0) {
-    if (options.dry_run) {
-      for (const BatchStage& stage : batch.stages) {
-        say(fmt::format("{}: {} parts", stage.name, stage.parts));
-      }
-      return {};
-    }
-    batch.jobs.clear();
-    WriteBatch(batch);
-    RunLocally(batch, progress);
-  } else {
-    if (!options.dry_run) WriteBatch(batch);
-    SubmitToSlurm(batch, options.dry_run, say);
-    if (options.dry_run) return {};
+  if (before) NoteProgram(*before, batch, progress);
+  if (options.dry_run) {
+    DryRun(batch, say);
+    return {};
   }
-  return StateOf(batch);
+  if (!lock) lock = LockBatch(batch.set);
+  if (options.local > 0) batch.jobs.clear();
+  WriteBatch(batch);
+  if (options.local == 0) {
+    SubmitToSlurm(batch, false, say);
+    return StateOf(batch);
+  }
+  RunLocally(batch, progress);
+  const BatchState state = StateOf(batch);
+  if (!state.finished) RejectMissingSet(batch);
+  return state;
 }
 
 BatchOptions ReadBatch(const fs::path& set) {
+  RequireOwnBatch(set);
   const Batch batch = LoadBatch(set);
   BatchOptions options;
-  options.program = batch.program;
   options.words = batch.words;
   options.directory = batch.directory;
   options.local = batch.local;

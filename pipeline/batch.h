@@ -21,7 +21,7 @@ struct SlurmOptions {
 struct BatchOptions {
   /// The build: what its stages are. All else comes from `words`.
   BuildOptions build;
-  std::filesystem::path program;    ///< dtr, as the jobs call it
+  std::filesystem::path program;    ///< dtr, as the jobs call it; never that of a record
   std::vector<std::string> words;   ///< of `dtr build`: photos and options
   std::filesystem::path directory;  ///< that relative paths among them begin in
   int array_size = 16;              ///< parts of a stage, at most
@@ -55,13 +55,14 @@ std::string ToJson(const BatchState& state);
 /// Runs the build here, or submits its jobs and returns. What is done already is not done again.
 /// Beside the set lies SET.batch, a folder with the jobs and what they say. `say` receives the
 /// lines of a dry run and of what was submitted. Throws UsageError where another batch of other
-/// words is under way or jobs of this one still are, Error where a part fails (naming it, its last
-/// line and its log), or Slurm rejects.
+/// words is under way or jobs of this one still are, or where SET.batch is not this user's; Error
+/// where a part fails (naming it, its last line and its log), the set is not there at the end, or
+/// Slurm rejects.
 BatchState RunBatch(const BatchOptions& options, const std::function<void(const std::string&)>& say,
                     Progress& progress);
 
-/// The batch that SET.batch describes, to be run again by RunBatch: what is missing. Throws Error
-/// where there is none.
+/// The batch that SET.batch describes, to be run again by RunBatch: what is missing. `program` is
+/// left to the caller. Throws Error where there is none, UsageError where it is not this user's.
 BatchOptions ReadBatch(const std::filesystem::path& set);
 
 /// How far it is. Throws Error where there is none.

@@ -302,7 +302,7 @@ void Write(const WebPageRequest& request, const Files& files, const fs::path& wo
 }  // namespace
 
 WebPageReport ExportWebPage(const WebPageRequest& request, Progress& progress) {
-  RequireNew(request.output, request.force);
+  RequireNew(request.output, "export", request.force);
   const Source source = SourceOf(request, progress);
   const WorkFolder work(WorkFolder::Of(request.output), "export");
   WebPageReport report;

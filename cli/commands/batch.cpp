@@ -133,6 +133,7 @@ void AddResumeCommand(CLI::App& batch) {
                return [set, asked](const Context& context) -> int {
                  BatchArguments arguments{pipeline::ReadBatch(*set), asked->slurm};
                  pipeline::BatchOptions& options = arguments.options;
+                 options.program = ThisProgram();
                  const pipeline::BatchOptions& given = asked->options;
                  if (given.local > 0) options.local = given.local;
                  if (asked->slurm) {

@@ -97,7 +97,7 @@ void ConvertDataset(const std::string& kind, const fs::path& source, const fs::p
     for (const Kind& candidate : kKinds) known += std::string(" ") + candidate.name;
     throw UsageError("dataset kind \"" + kind + "\": expected one of" + known);
   }
-  if (fs::exists(out)) {
+  if (WorkFolder::IsTaken(out, "dataset")) {
     throw UsageError(out.string() + ": exists; choose another folder or remove it");
   }
   if (!fs::is_directory(source)) {

@@ -59,7 +59,7 @@ void WritePhoto(const Scene& scene, const HardPhoto& photo, std::uint64_t index,
 }  // namespace
 
 void WriteHardSet(const HardSet& set, const fs::path& folder, int threads) {
-  if (fs::exists(folder)) {
+  if (WorkFolder::IsTaken(folder, "hard set")) {
     throw UsageError(folder.string() +
                      ": expected a folder that does not exist yet; remove it or choose another "
                      "name");

@@ -4,10 +4,25 @@
 #include <atomic>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
 namespace dtr {
+namespace {
+
+// At most so many threads: the first one that the system rejects is the last one that is asked for.
+std::vector<std::jthread> StartThreads(int count, const std::function<void()>& work) {
+  std::vector<std::jthread> threads;
+  threads.reserve(static_cast<size_t>(count));
+  try {
+    for (int t = 0; t < count; ++t) threads.emplace_back(work);
+  } catch (const std::system_error&) {
+  }
+  return threads;
+}
+
+}  // namespace
 
 int ResolveThreads(int requested) {
   if (requested > 0) return requested;
@@ -45,9 +60,7 @@ void ParallelFor(int begin, int end, int threads, const std::function<void(int)>
     }
   };
   {
-    std::vector<std::jthread> pool;
-    pool.reserve(static_cast<size_t>(workers) - 1);
-    for (int t = 1; t < workers; ++t) pool.emplace_back(work);
+    const std::vector<std::jthread> pool = StartThreads(workers - 1, work);
     work();
   }  // joins
   if (first_error) std::rethrow_exception(first_error);

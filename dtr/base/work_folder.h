@@ -22,6 +22,12 @@ class WorkFolder {
   static void RejectForeign(const std::filesystem::path& folder, const std::string& kind);
   /// The lock of a folder of this kind. Throws UsageError while another process has it.
   static FileLock Lock(const std::filesystem::path& folder, const std::string& kind);
+  /// Whether something is at `target` that stands in the way of Become(). Only a folder does not
+  /// that a process made as `kind` and was killed before it took its mark away: it is whole, and
+  /// nobody was told of it.
+  static bool IsTaken(const std::filesystem::path& target, const std::string& kind);
+  /// Removes a folder of this kind that a killed process left and no other one works in.
+  static void ClearLeft(const std::filesystem::path& folder, const std::string& kind) noexcept;
 
   /// Makes the folder, or clears what was left in it. Throws UsageError where it is not ours or
   /// another process is at work in it, Error where it cannot be made or cleared.
@@ -32,7 +38,9 @@ class WorkFolder {
   WorkFolder& operator=(const WorkFolder&) = delete;
 
   const std::filesystem::path& path() const { return path_; }
-  /// Everything in it to the disk, one rename, and the mark goes.
+  /// Everything in it to the disk, one rename, and the mark goes. Where a killed process came as
+  /// far as the rename (IsTaken), its folder stays and loses its mark; throws UsageError where that
+  /// holds anything else than this one.
   void Become(const std::filesystem::path& target);
   /// The last two steps of it apart, for who must do something between them.
   void MoveTo(const std::filesystem::path& target);

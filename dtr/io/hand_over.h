@@ -11,4 +11,8 @@ namespace dtr::io {
 void HandOver(const std::filesystem::path& target, const std::string& from_json,
               const std::string& to_json);
 
+/// Puts right what a run left beside the set `target` that was killed on its way into place, as
+/// SetWriter does before it writes. Throws Error, UsageError while another process is at it.
+void Recover(const std::filesystem::path& target);
+
 }  // namespace dtr::io

@@ -217,6 +217,11 @@ void HandOver(const fs::path& target, const std::string& from_json, const std::s
   AsError([&] { set.HandOver(from_json, to_json); });
 }
 
+void Recover(const fs::path& target) {
+  const PartialSet set(target, false);
+  AsError([&] { set.Recover(); });
+}
+
 void PartialSet::MoveIntoPlace() {
   ExpectReplaceable();
   const bool replace = fs::exists(target);

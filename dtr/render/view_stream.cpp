@@ -9,6 +9,7 @@
 #include <numeric>
 #include <optional>
 #include <stdexcept>
+#include <system_error>
 #include <thread>
 
 #include "dtr/base/error.h"
@@ -44,7 +45,8 @@ void DropPixels(View& view) {
   view.mesh.reset();
 }
 
-/// The threads that read; requests go in and views come out under one lock.
+/// The threads that read; requests go in and views come out under one lock. Where the system
+/// rejects threads there are fewer; with none what is asked for is read at once.
 class ViewStream::Readers {
  public:
   struct Result {
@@ -54,15 +56,20 @@ class ViewStream::Readers {
   };
 
   Readers(Loader load, int threads) : load_(std::move(load)) {
-    for (int i = 0; i < threads; ++i) {
-      threads_.emplace_back([this](const std::stop_token& stop) { Run(stop); });
+    try {
+      for (int i = 0; i < threads; ++i) {
+        threads_.emplace_back([this](const std::stop_token& stop) { Run(stop); });
+      }
+    } catch (const std::system_error&) {
     }
   }
 
   void Ask(size_t slot, View description) {
+    Result request{slot, std::move(description), {}};
+    if (threads_.empty()) return Read(std::move(request));
     {
       const std::lock_guard lock(mutex_);
-      requests_.push_back({slot, std::move(description), {}});
+      requests_.push_back(std::move(request));
     }
     asked_.notify_one();
   }
@@ -85,18 +92,22 @@ class ViewStream::Readers {
         request = std::move(requests_.front());
         requests_.pop_front();
       }
-      try {
-        load_(request->view);
-        RequireLoaded(request->view);
-      } catch (const std::exception& error) {
-        request->error = error.what();
-      }
-      {
-        const std::lock_guard lock(mutex_);
-        results_.push_back(std::move(*request));
-      }
-      read_.notify_one();
+      Read(std::move(*request));
     }
+  }
+
+  void Read(Result request) {
+    try {
+      load_(request.view);
+      RequireLoaded(request.view);
+    } catch (const std::exception& error) {
+      request.error = error.what();
+    }
+    {
+      const std::lock_guard lock(mutex_);
+      results_.push_back(std::move(request));
+    }
+    read_.notify_one();
   }
 
   const Loader load_;

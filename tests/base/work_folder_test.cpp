@@ -61,6 +61,52 @@ TEST(WorkFolder, WhatAKilledOneLeftIsClearedAndNothingElse) {
   EXPECT_FALSE(fs::exists(partial));
 }
 
+TEST(WorkFolder, OneThatWasKilledBeforeItsMarkWentIsFinishedByTheNext) {
+  const TemporaryFolder folder;
+  const fs::path target = folder / "out", partial = WorkFolder::Of(target);
+  EXPECT_FALSE(WorkFolder::IsTaken(target, "thing"));
+  Killed([&](const auto& now) {
+    WorkFolder work(partial, "thing");
+    fs::create_directories(work.path() / "below");
+    WriteFileAtomically(work.path() / "below/file", "x");
+    work.MoveTo(target);
+    now();
+  });
+  ASSERT_TRUE(fs::exists(target / "thing.lock"));
+  EXPECT_TRUE(WorkFolder::IsTaken(target, "capture"));
+  EXPECT_FALSE(WorkFolder::IsTaken(target / "", "thing"));
+  const auto make = [&](const std::string& content) {
+    WorkFolder work(partial, "thing");
+    fs::create_directories(work.path() / "below");
+    WriteFileAtomically(work.path() / "below/file", content);
+    work.Become(target);
+  };
+  EXPECT_THAT(MessageOf<UsageError>([&] { make("y"); }),
+              HasSubstr("out: exists already, with other files than this command makes"));
+  EXPECT_EQ(ReadFile(target / "below/file", 10), "x");
+  EXPECT_TRUE(fs::exists(target / "thing.lock"));
+  make("x");
+  EXPECT_FALSE(fs::exists(target / "thing.lock"));
+  EXPECT_FALSE(fs::exists(partial));
+  EXPECT_TRUE(WorkFolder::IsTaken(target, "thing"));
+}
+
+TEST(WorkFolder, WhatIsLeftIsClearedWhereNobodyWorks) {
+  const TemporaryFolder folder;
+  const fs::path partial = folder / "out.partial";
+  Killed([&](const auto& now) {
+    const WorkFolder work(partial, "thing");
+    now();
+  });
+  WorkFolder::ClearLeft(partial, "capture");
+  EXPECT_TRUE(fs::exists(partial));
+  WorkFolder::ClearLeft(partial, "thing");
+  EXPECT_FALSE(fs::exists(partial));
+  const WorkFolder at_work(partial, "thing");
+  WorkFolder::ClearLeft(partial, "thing");
+  EXPECT_TRUE(fs::exists(partial));
+}
+
 TEST(WorkFolder, WhatIsNotItsOwnIsLeftAlone) {
   const TemporaryFolder folder;
   fs::create_directories(folder / "somebodys/folder");

@@ -1,5 +1,6 @@
 // Commands that are killed at work: the same command leaves nothing but its result.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <unistd.h>
@@ -11,6 +12,7 @@
 #include "dtr/base/process.h"
 #include "dtr/io/run_record.h"
 #include "tests/cli/courtyard_and_set.h"
+#include "tests/cli/failing_calls.h"
 #include "tests/cli/fake_sfm.h"
 
 namespace dtr::testing {
@@ -68,6 +70,39 @@ TEST_F(LeftOver, AnExportHalfWritten) {
   DtrOk(exporting);
   EXPECT_THAT(NamesIn(work_), ElementsAre("out"));
   EXPECT_EQ(FilesIn(work_ / "out"), 0);  // folders alone: no mark
+}
+
+// Before each of its renames and deletions in turn, the last ones included.
+TEST_F(LeftOver, ResultsOfCommandsKilledAtEveryRenameAndDeletion) {
+  DTR_REQUIRE_FAILING_CALLS();
+  const std::string set = Shared("good.dtr");
+  // The next run finishes a folder; that a single file or a set is there it says.
+  const std::pair<std::vector<std::string>, std::string> commands[] = {
+      {{"export", set, "--format", "colmap", "-o", Work("out")}, ""},
+      {{"export", set, "--format", "depth", "-o", Work("out")}, ""},
+      {{"export", set, "--format", "ply", "-o", Work("out.ply")}, "exists already"},
+      {{"export", set, "--format", "web", "--no-evaluate", "-o", Work("out.html")},
+       "exists already"},
+      {{"dataset", "make", "courtyard", "--views", "2", "--width", "32", "--height", "24", "-o",
+        Work("out")},
+       ""},
+      {{"join", set, set, "-o", Work("out.dtr")}, "expected no such folder yet, found one"}};
+  for (const auto& [command, there] : commands) {
+    DtrOk(command);
+    const auto expected = Contents(work_);
+    bool killed = true;
+    for (int call = 1; killed; ++call) {
+      for (const auto& entry : fs::directory_iterator(work_)) fs::remove_all(entry.path());
+      killed = DtrWithFailingCalls("DTR_TEST_KILLED_AT", call, command).signal == SIGKILL;
+      const Ran again = Dtr(command);
+      if (again.code != 0) {
+        ASSERT_NE(there, "") << again.err;
+        ExpectRejected(again, kWrongUsage, there);
+      }
+      EXPECT_THAT(DifferingFiles(expected, Contents(work_)), IsEmpty())
+          << fmt::format("{}", fmt::join(command, " ")) << ", killed at call " << call;
+    }
+  }
 }
 
 TEST_F(LeftOver, ADatasetHalfMade) {

@@ -5,6 +5,7 @@
 #include <exception>
 #include <utility>
 
+#include "dtr/base/thread_if_any.h"
 #include "viewer/glfw/error_text.h"
 
 namespace dtr::viewer {
@@ -59,10 +60,10 @@ std::optional<Probe> Inspector::ProbeAt(const Eigen::Vector2d& pixel) {
 void Inspector::AskForValidations() {
   if (!inspection_.cameras || !from_.validations) return;
   if (!std::exchange(validations_asked_, true)) {
-    validations_coming_ = std::async(std::launch::async, from_.validations);
+    validations_coming_ = std::async(kThreadIfAny, from_.validations);
   }
   if (validations_coming_.valid() &&
-      validations_coming_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
+      validations_coming_.wait_for(std::chrono::seconds(0)) != std::future_status::timeout) {
     try {
       validations_ = validations_coming_.get();
     } catch (const std::exception& error) {

@@ -4,6 +4,7 @@
 #include <exception>
 #include <utility>
 
+#include "dtr/base/thread_if_any.h"
 #include "dtr/report/contact_sheet.h"
 #include "viewer/glfw/error_text.h"
 
@@ -41,7 +42,7 @@ void PhotoCache::Begin(const View& view) {
   described.camera = view.camera;
   described.image_file = view.image_file;
   described.image_frame = view.image_frame;
-  reading_ = std::async(std::launch::async, [load = load_, described, at = &view] {
+  reading_ = std::async(kThreadIfAny, [load = load_, described, at = &view] {
     Read read;
     read.view = at;
     try {
@@ -56,7 +57,7 @@ void PhotoCache::Begin(const View& view) {
 
 void PhotoCache::Tend() {
   if (reading_.valid()) {
-    if (reading_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+    if (reading_.wait_for(std::chrono::seconds(0)) == std::future_status::timeout) return;
     Read read = reading_.get();
     if (!read.rejection.empty()) {
       rejections_[read.view] = read.rejection;

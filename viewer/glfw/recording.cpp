@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "dtr/base/progress.h"
+#include "dtr/base/thread_if_any.h"
 
 namespace dtr::viewer {
 namespace {
@@ -40,12 +41,12 @@ const NovelCamera* Recording::Wanted() const {
 void Recording::Add(const ImageRgb8& picture) {
   writer_->Add(picture);
   if (++drawn_ < cameras_.size()) return;
-  encoding_ = std::async(std::launch::async, [this] { writer_->Finish(Stoppable(stop_)); });
+  encoding_ = std::async(kThreadIfAny, [this] { writer_->Finish(Stoppable(stop_)); });
 }
 
 bool Recording::Done() {
   if (!encoding_.valid() ||
-      encoding_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
+      encoding_.wait_for(std::chrono::seconds(0)) == std::future_status::timeout) {
     return false;
   }
   encoding_.get();

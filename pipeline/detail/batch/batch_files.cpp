@@ -17,7 +17,6 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr char kFile[] = "batch.json";
 constexpr std::uintmax_t kLargestFileBytes = 64u << 20;
 
 Json ToJson(const Batch& batch) {
@@ -103,31 +102,37 @@ fs::path LogOf(const Batch& batch, const BatchStage& stage, int part) {
   return BatchFolder(batch.set) / "logs" / fmt::format("{}_{}.log", stage.name, part + 1);
 }
 
-bool HasBatch(const fs::path& set) { return fs::exists(BatchFolder(set) / kFile); }
+bool HasBatch(const fs::path& set) { return fs::exists(BatchFolder(set) / kBatchFile); }
 
 void WriteBatch(const Batch& batch) {
-  const fs::path folder = BatchFolder(batch.set);
-  std::error_code error;
-  fs::create_directories(folder / "logs", error);
-  if (error) throw Error(folder.string() + ": cannot be made: " + error.message());
-  WriteFileAtomically(folder / kFile,
+  WriteFileAtomically(BatchFolder(batch.set) / kBatchFile,
                       ToJson(batch).dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 Batch LoadBatch(const fs::path& set) {
-  const fs::path file = BatchFolder(set) / kFile;
+  const fs::path file = BatchFolder(set) / kBatchFile;
   if (!HasBatch(set)) {
     throw Error(file.string() + ": expected a batch of that set, found none; dtr batch begins one");
   }
   const std::string text = ReadFile(file, kLargestFileBytes);
+  Batch batch;
   try {
-    return FromJson(Json::parse(text));
+    batch = FromJson(Json::parse(text));
   } catch (const std::exception& error) {
     throw Error(
-        fmt::format("{}: expected what dtr batch writes, found something else ({}); delete "
-                    "the folder and begin the batch again, what was built stays",
+        fmt::format("{}: expected what dtr batch writes, found something else ({}); move "
+                    "the folder away and begin the batch again, what was built stays",
                     file.string(), error.what()));
   }
+  // The same folder may have several names on the machines of a cluster.
+  std::error_code none;
+  if (!fs::equivalent(BatchFolder(batch.set), BatchFolder(set), none)) {
+    throw Error(fmt::format(
+        "{}: expected the batch of that set, found that of {}; if the folder was moved, delete it "
+        "and begin the batch again, what was built stays",
+        file.string(), batch.set.string()));
+  }
+  return batch;
 }
 
 std::int64_t WhenWritten(const fs::path& set) {

@@ -18,6 +18,9 @@ struct BatchStage {
 };
 inline constexpr char kLastStage[] = "finishing";
 
+/// In SET.batch.
+inline constexpr char kBatchFile[] = "batch.json";
+
 /// Jobs of Slurm: an array of parts of a stage.
 struct BatchJobs {
   std::string id, stage;
@@ -28,7 +31,7 @@ struct BatchJobs {
 /// What batch.json holds.
 struct Batch {
   std::filesystem::path set;        ///< absolute
-  std::filesystem::path program;    ///< dtr
+  std::filesystem::path program;    ///< dtr, as it ran last; no record decides which is run
   std::filesystem::path directory;  ///< absolute; relative paths among the words begin here
   std::vector<std::string> words;   ///< of `dtr build`
   std::vector<BatchStage> stages;   ///< each needs all before it
@@ -47,9 +50,9 @@ std::filesystem::path BatchFolder(const std::filesystem::path& set);
 /// Where the output of a part goes that runs here. `part` from 0.
 std::filesystem::path LogOf(const Batch& batch, const BatchStage& stage, int part);
 
-/// Writes batch.json. Throws Error.
+/// Writes batch.json into the folder, which LockBatch made. Throws Error.
 void WriteBatch(const Batch& batch);
-/// Throws Error where there is none or it is damaged.
+/// Throws Error where there is none, or it is damaged or of another set.
 Batch LoadBatch(const std::filesystem::path& set);
 bool HasBatch(const std::filesystem::path& set);
 

@@ -34,7 +34,7 @@ std::vector<std::string> NamesWith(const std::vector<View>& views,
 }  // namespace
 
 DtrSet SetToExport(const ExportRequest& request, const char* format, Progress& progress) {
-  RequireNew(WithoutTrailingSlash(request.output), request.force);
+  RequireNew(WithoutTrailingSlash(request.output), "export", request.force);
   DtrSet set = io::ReadSet(request.set);
   if (set.frames.size() != 1) {
     throw Error(fmt::format(

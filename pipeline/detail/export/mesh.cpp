@@ -72,6 +72,7 @@ class MeshMaker {
 
   Mesh Make() {
     ChooseVoxel();
+    LeaveOutEmptyBlocks();
     ComputeBlocks();
     Join();
     LeaveOutSmallParts();
@@ -90,6 +91,33 @@ class MeshMaker {
       // Blocks of a surface are as many as its area has.
       mesh_.voxel *= 1.1 * std::sqrt(static_cast<double>(places_.size()) / most);
     }
+  }
+
+  // A surface needs distances of several views: blocks that fewer of them reach have none. Of depth
+  // that is far or noisy these are nearly all: every sample has blocks of its own.
+  void LeaveOutEmptyBlocks() {
+    std::vector<int> reached(places_.size());
+    const std::vector<View>& all = views_.set().frames.front().views;
+    for (const int v : views_.WithDepth()) {
+      progress_.ThrowIfInterrupted();
+      const View& view = all[static_cast<size_t>(v)];
+      const auto surface = views_.Get(v);
+      const NearDepths near_depths(*surface, mesh_.voxel);
+      ParallelFor(0, static_cast<int>((places_.size() + kBatch - 1) / kBatch), options_.threads,
+                  [&](int batch) {
+                    const size_t first = static_cast<size_t>(batch) * kBatch;
+                    for (size_t i = first; i < std::min(first + kBatch, places_.size()); ++i) {
+                      if (reached[i] >= options_.min_views) continue;
+                      reached[i] +=
+                          MaySee(view, places_[i], mesh_.voxel) && near_depths.MayReach(places_[i]);
+                    }
+                  });
+    }
+    size_t kept = 0;
+    for (size_t i = 0; i < places_.size(); ++i) {
+      if (reached[i] >= options_.min_views) places_[kept++] = places_[i];
+    }
+    places_.resize(kept);
   }
 
   void ComputeBlocks() {

@@ -13,11 +13,12 @@ constexpr double kLargestStep = 2;
 // Noise that all distances have besides sigma, voxels.
 constexpr double kFloor = 0.25;
 constexpr double kMeshLeastCosine = 0.1;
+constexpr double kRounding = 1e-6;  // of pixels, and a share of a depth: more than floats lose
 constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 
-// Cosine between the ray and the normal where the ray of a pixel meets the surface; 0 where the
-// neighbours are of no one surface with it.
-double CosineAt(const SurfaceView& surface, int x, int y, const Eigen::Vector3d& ray) {
+// Change of 1/z across a sample, per unit of the image plane; NaN where the neighbours are of no
+// one surface with it.
+Eigen::Vector2d SlopesAt(const SurfaceView& surface, int x, int y) {
   const Grid<float>& map = surface.inverse_depth;
   const float w = map(x, y);
   const auto slope = [&](int dx, int dy) {
@@ -32,8 +33,15 @@ double CosineAt(const SurfaceView& surface, int x, int y, const Eigen::Vector3d&
     }
     return sides > 0 ? sum / sides : std::numeric_limits<double>::quiet_NaN();
   };
-  const double across = slope(1, 0) * surface.camera.fx_px();
-  const double down = slope(0, 1) * surface.camera.fy_px();
+  return {slope(1, 0) * surface.camera.fx_px(), slope(0, 1) * surface.camera.fy_px()};
+}
+
+// Cosine between the ray and the normal where the ray of a pixel meets the surface; 0 where the
+// neighbours are of no one surface with it.
+double CosineAt(const SurfaceView& surface, int x, int y, const Eigen::Vector3d& ray) {
+  const Eigen::Vector2d slopes = SlopesAt(surface, x, y);
+  const double across = slopes.x(), down = slopes.y();
+  const float w = surface.inverse_depth(x, y);
   const Eigen::Vector3d n(across, down, w - across * ray.x() - down * ray.y());
   const double cosine = n.dot(ray) / (n.norm() * ray.norm());
   return cosine > 0 ? cosine : 0;  // NaN too
@@ -136,6 +144,41 @@ class Lattice {
   std::array<float, static_cast<size_t>(kSide* kSide* kSide)> distance_{};
 };
 
+// Furthest that a point may lie before or behind the surface of a pixel along z, voxels, to be
+// within the truncation along the normal; 0: it never is. With n as in CosineAt, n . ray = w: the
+// distance along the normal is |n| / w of that along z.
+double ReachAt(const SurfaceView& surface, int x, int y) {
+  const PinholeCamera& camera = surface.camera;
+  const Eigen::Vector2d slopes = SlopesAt(surface, x, y);
+  if (!slopes.allFinite()) return 0;
+  const double w = surface.inverse_depth(x, y);
+  // Of all rays through the pixel.
+  const Eigen::Vector3d ray = camera.RayFromPixel({x + 0.5, y + 0.5});
+  const Eigen::Vector2d half(0.5 / camera.fx_px(), 0.5 / camera.fy_px());
+  const double shortest = std::max(1.0, ray.norm() - half.norm());
+  const double normal_z = std::abs(w - slopes.dot(ray.head<2>()));
+  const double change = slopes.cwiseAbs().dot(half);
+  const double least = std::hypot(slopes.norm(), std::max(0.0, normal_z - change));
+  const double most = std::hypot(slopes.norm(), normal_z + change);
+  if (w < kMeshLeastCosine * (1 - kRounding) * least * shortest) return 0;
+  return kTruncation * std::min(most / w, 1 / (kMeshLeastCosine * shortest));
+}
+
+// Smallest and largest 1/z that InverseDepthAt gives within a pixel.
+std::pair<double, double> InverseDepthsAround(const SurfaceView& surface, int x, int y) {
+  const Grid<float>& map = surface.inverse_depth;
+  double low = map(x, y), high = low;
+  for (int v = y - 1; v <= y + 1; ++v) {
+    for (int u = x - 1; u <= x + 1; ++u) {
+      if (!map.Contains(u, v) || !(map(u, v) > 0)) continue;
+      if (std::abs(map(u, v) - map(x, y)) > kOneSurfacePx * surface.inverse_depth_per_px) continue;
+      low = std::min<double>(low, map(u, v));
+      high = std::max<double>(high, map(u, v));
+    }
+  }
+  return {low, high};
+}
+
 }  // namespace
 
 std::vector<BlockPlace> BlocksOf(const SurfaceView& surface, double voxel) {
@@ -175,6 +218,57 @@ std::vector<BlockPlace> BlocksOf(const SurfaceView& surface, double voxel) {
   }
   compact();
   return blocks;
+}
+
+NearDepths::NearDepths(const SurfaceView& surface, double voxel)
+    : surface_(surface), voxel_(voxel) {
+  const Grid<float>& map = surface.inverse_depth;
+  from_ = Grid<float>(map.width(), map.height(), 1, std::numeric_limits<float>::infinity());
+  to_ = Grid<float>(map.width(), map.height());
+  for (int y = 0; y < map.height(); ++y) {
+    for (int x = 0; x < map.width(); ++x) {
+      if (!(map(x, y) > 0)) continue;
+      const double reach = ReachAt(surface, x, y) * voxel;
+      if (!(reach > 0)) continue;
+      const auto [low, high] = InverseDepthsAround(surface, x, y);
+      // What floats round is less.
+      const double more = reach + kRounding / low;
+      from_(x, y) = static_cast<float>(1 / high - more);
+      to_(x, y) = static_cast<float>(1 / low + more);
+    }
+  }
+}
+
+bool NearDepths::MayReach(const BlockPlace& place) const {
+  constexpr int kMaxPixels = 1 << 14;  // to look at; more take longer than the block itself
+  Eigen::Vector3d low = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
+  Eigen::Vector3d high = -low;
+  for (int i = 0; i < 8; ++i) {
+    Eigen::Vector3d corner = Lattice::Corner(i).cast<double>();
+    for (int c = 0; c < 3; ++c) {
+      corner[c] = voxel_ * kBlockSide * (place[static_cast<size_t>(c)] + corner[c]);
+    }
+    const Eigen::Vector3d p = surface_.InCam(corner);
+    if (!(p.z() > 0)) return true;
+    const Eigen::Vector2d pixel = *surface_.camera.PixelFromCam(p);
+    low = low.cwiseMin(Eigen::Vector3d(pixel.x(), pixel.y(), p.z()));
+    high = high.cwiseMax(Eigen::Vector3d(pixel.x(), pixel.y(), p.z()));
+  }
+  // The image of a block is the convex hull of its corners'.
+  const auto pixel = [](double at, int size) {
+    return static_cast<int>(std::clamp(std::floor(at), 0.0, size - 1.0));
+  };
+  const int x0 = pixel(low.x() - kRounding, from_.width());
+  const int x1 = pixel(high.x() + kRounding, from_.width());
+  const int y0 = pixel(low.y() - kRounding, from_.height());
+  const int y1 = pixel(high.y() + kRounding, from_.height());
+  if (std::int64_t{x1 - x0} * (y1 - y0) > kMaxPixels) return true;
+  for (int y = y0; y <= y1; ++y) {
+    for (int x = x0; x <= x1; ++x) {
+      if (from_(x, y) <= high.z() && to_(x, y) >= low.z()) return true;
+    }
+  }
+  return false;
 }
 
 MeshBlock MeshBlockOf(const BlockPlace& place, double voxel, int min_views,

@@ -37,6 +37,20 @@ struct MeshBlock {
 /// order.
 std::vector<BlockPlace> BlocksOf(const SurfaceView& surface, double voxel);
 
+/// Depths at which a view may show the surface to a voxel, by the pixel that the voxel is seen in.
+class NearDepths {
+ public:
+  NearDepths(const SurfaceView& surface, double voxel);
+  /// False where no voxel of a block, nor one of its neighbours' first ones, is within the
+  /// truncation of what the view shows: to the block the view adds no distance.
+  bool MayReach(const BlockPlace& place) const;
+
+ private:
+  const SurfaceView& surface_;
+  double voxel_;
+  Grid<float> from_, to_;  ///< z in the camera frame; infinity, 0: never
+};
+
 /// Distances of a block's voxels and its neighbours' first ones, as Mesh describes it; `views`: all
 /// that see it.
 MeshBlock MeshBlockOf(const BlockPlace& place, double voxel, int min_views,

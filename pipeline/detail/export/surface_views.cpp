@@ -15,8 +15,6 @@ namespace {
 
 // Where the distance of the cameras says nothing of a pixel of disparity: a share of 1/z.
 constexpr double kPixelOfLoneView = 0.003;
-// Four samples whose 1/z differ by more pixels of disparity than this are not one surface.
-constexpr double kOneSurfacePx = 2;
 
 bool IsUsable(const View& view, int x, int y) {
   if (view.mask.empty()) return true;

@@ -14,6 +14,9 @@
 
 namespace dtr::pipeline {
 
+/// Four samples whose 1/z differ by more pixels of disparity than this are not one surface.
+inline constexpr double kOneSurfacePx = 2;
+
 /// Depth of a view as inverse depth, on the grid of its depth map.
 struct SurfaceView {
   int index = 0;                                           ///< of the view in frames[0].views

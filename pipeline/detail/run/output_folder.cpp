@@ -17,8 +17,9 @@ void RequireFree(const fs::path& folder, const std::vector<std::string>& names) 
   }
 }
 
-void RequireNew(const fs::path& output, bool force) {
-  if (!fs::exists(output) || (force && fs::is_regular_file(output))) return;
+void RequireNew(const fs::path& output, const std::string& kind, bool force) {
+  if (!WorkFolder::IsTaken(output, kind) || (force && fs::is_regular_file(output))) return;
+  WorkFolder::ClearLeft(WorkFolder::Of(output), kind);
   throw UsageError(output.string() + ": exists already; choose another name");
 }
 

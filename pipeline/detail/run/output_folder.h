@@ -12,8 +12,10 @@ namespace dtr::pipeline {
 /// Throws UsageError naming the first of `names` that is in `folder` already.
 void RequireFree(const std::filesystem::path& folder, const std::vector<std::string>& names);
 
-/// Throws UsageError where `output` is there, unless it is a file and `force`.
-void RequireNew(const std::filesystem::path& output, bool force);
+/// Throws UsageError where `output` is there, unless it is a file and `force`, or the work of a
+/// killed process that this one finishes (WorkFolder::IsTaken). What such a process left beside it
+/// is cleared away.
+void RequireNew(const std::filesystem::path& output, const std::string& kind, bool force);
 
 /// A folder into which a job writes files, while a file KIND.lock in it says so: after a job that
 /// was cut off the same command replaces what it left.
