@@ -18,3 +18,9 @@ if(DTR_WITH_PYTHON)
     message(FATAL_ERROR "DTR_WITH_PYTHON is ${DTR_WITH_PYTHON}: expected pybind11 2.10 and Python's headers, found none; install pybind11-dev and python3-dev or set DTR_WITH_PYTHON=AUTO")
   endif()
 endif()
+if(NOT DTR_HAS_PYTHON)
+  # `--target dtr dtr_python` builds all that there is.
+  add_custom_target(dtr_python COMMAND ${CMAKE_COMMAND} -E echo
+    "dtr_python: left out, needs pybind11 and Python's headers: apt-get install pybind11-dev python3-dev, then configure with -DDTR_WITH_PYTHON=AUTO"
+    VERBATIM)
+endif()

@@ -261,10 +261,14 @@ void WriteImage(const fs::path& file, const ImageRgb8& image, int jpeg_quality) 
   }
 }
 
+std::string EncodePng(const ImageRgb8& image) {
+  ExpectRgb("PNG", image);
+  return EncodeImage(".png", Rgb8Spec(image), TypeDesc::UINT8, image.data().data());
+}
+
 void WritePng(const fs::path& file, const ImageRgb8& image) {
   ExpectRgb(file, image);
-  WriteFileAtomically(file,
-                      EncodeImage(".png", Rgb8Spec(image), TypeDesc::UINT8, image.data().data()));
+  WriteFileAtomically(file, EncodePng(image));
 }
 
 void WriteImageWithAlpha(const fs::path& file, const ImageRgb8& image, const Mask& alpha) {

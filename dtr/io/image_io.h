@@ -125,6 +125,9 @@ inline constexpr int kDefaultJpegQuality = 95;
 void WriteImage(const std::filesystem::path& file, const ImageRgb8& image,
                 int jpeg_quality = kDefaultJpegQuality);
 
+/// A PNG file in memory. Throws Error where the image has not 3 channels.
+std::string EncodePng(const ImageRgb8& image);
+
 /// The same as PNG, whatever the file is called.
 void WritePng(const std::filesystem::path& file, const ImageRgb8& image);
 

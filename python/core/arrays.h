@@ -37,6 +37,15 @@ py::object ViewOf(const std::shared_ptr<const Grid<T>>& grid) {
   return array;
 }
 
+/// A depth map of holes, read-only, which takes no memory.
+inline py::array HolesOf(int width, int height) {
+  static const float hole = 0;
+  py::array array(py::dtype::of<float>(), std::vector<py::ssize_t>{height, width},
+                  std::vector<py::ssize_t>{0, 0}, &hole, py::capsule(&hole, [](void*) {}));
+  MakeReadOnly(array);
+  return array;
+}
+
 /// An array that has the grid's memory and may be written to: nobody else has it.
 template <typename T>
 py::array ArrayOf(Grid<T> grid) {
@@ -47,14 +56,23 @@ py::array ArrayOf(Grid<T> grid) {
   return py::array(py::dtype::of<T>(), shape, data, OwnerOf(std::move(owned)));
 }
 
-/// The same of a list, `columns` numbers a row; 1: one dimension.
+/// The same of a list, `columns` numbers a row; 1: one dimension. `type`: of the size of T.
 template <typename T>
-py::array ArrayOf(std::vector<T> values, py::ssize_t columns = 1) {
+py::array ArrayOf(std::vector<T> values, py::ssize_t columns = 1,
+                  const py::dtype& type = py::dtype::of<T>()) {
   std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(values.size()) / columns};
   if (columns > 1) shape.push_back(columns);
   auto owned = std::make_shared<std::vector<T>>(std::move(values));
   T* const data = owned->data();
-  return py::array(py::dtype::of<T>(), shape, data, OwnerOf(std::move(owned)));
+  return py::array(type, shape, data, OwnerOf(std::move(owned)));
+}
+
+/// `matrix`, read-only.
+template <typename Matrix>
+py::object ReadOnly(const Matrix& matrix) {
+  py::array array = py::cast(matrix);
+  MakeReadOnly(array);
+  return array;
 }
 
 }  // namespace dtr::python

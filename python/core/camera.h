@@ -8,6 +8,10 @@
 
 namespace dtr::python {
 
+/// As numpy has them.
+using RowMajor3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+using RowMajor4d = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
+
 /// K of a camera: [fx 0 cx; 0 fy cy; 0 0 1], pixels.
 Eigen::Matrix3d MatrixOf(const PinholeCamera& camera);
 

@@ -7,6 +7,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/io/formats/pose_from_matrix.h"
+#include "dtr/io/image_io.h"
 #include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/small_jpeg.h"
@@ -18,19 +19,19 @@
 #include "python/core/arrays.h"
 #include "python/core/caller.h"
 #include "python/core/camera.h"
+#include "python/core/casters.h"
 #include "python/core/open_set.h"
 #include "python/core/render_pool.h"
+#include "python/core/unlocked.h"
 #include "python/core/unproject.h"
 
 namespace dtr::python {
 namespace {
 
 using NovelFrame = pipeline::NovelFrame;
-using RowMajor3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-using RowMajor4d = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
 
 /// A set and what draws it.
-struct Set {
+struct Set : std::enable_shared_from_this<Set> {
   explicit Set(const std::filesystem::path& folder) : open(folder), pool(folder, open.set()) {}
   OpenSet open;
   RenderPool pool;
@@ -43,17 +44,28 @@ struct SetView {
   const View& view() const { return set->open.view(at); }
 };
 
-template <typename Matrix>
-py::object ReadOnly(const Matrix& matrix) {
-  py::array array = py::cast(matrix);
-  MakeReadOnly(array);
-  return array;
-}
+}  // namespace
+}  // namespace dtr::python
+
+namespace pybind11::detail {
+
+template <>
+class type_caster<dtr::python::Set> : public dtr::python::CasterOfMade<dtr::python::Set> {};
+template <>
+class type_caster<dtr::python::SetView> : public dtr::python::CasterOfMade<dtr::python::SetView> {};
+template <>
+class type_caster<dtr::python::RenderSettings>
+    : public dtr::python::CasterOfMade<dtr::python::RenderSettings> {};
+
+}  // namespace pybind11::detail
+
+namespace dtr::python {
+namespace {
 
 py::object BytesOf(const SetView& view, Plane plane) {
   Bytes pixels;
   {
-    const py::gil_scoped_release release;
+    const Unlocked unlocked;
     pixels = view.set->open.BytesOf(view.at, plane);
   }
   return ViewOf(pixels);
@@ -62,20 +74,18 @@ py::object BytesOf(const SetView& view, Plane plane) {
 py::object FloatsOf(const SetView& view, Plane plane) {
   Floats pixels;
   {
-    const py::gil_scoped_release release;
+    const Unlocked unlocked;
     pixels = view.set->open.FloatsOf(view.at, plane);
   }
   return ViewOf(pixels);
 }
 
-/// Of a held-out view: holes, which take no memory.
+/// Of a held-out view: holes.
 py::object DepthOf(const SetView& view) {
   const py::object depth = FloatsOf(view, Plane::kDepth);
   if (!depth.is_none() || view.view().role != ViewRole::kHeldOut) return depth;
   const PinholeCamera camera = view.view().DepthCamera();
-  const py::module_ numpy = py::module_::import("numpy");
-  return numpy.attr("broadcast_to")(numpy.attr("float32")(0),
-                                    py::make_tuple(camera.height_px(), camera.width_px()));
+  return HolesOf(camera.width_px(), camera.height_px());
 }
 
 std::uintptr_t AddressOf(const SetView& view, const std::string& plane) {
@@ -97,17 +107,34 @@ py::bytes ThumbnailOf(const SetView& view, int max_side_px) {
   }
   std::string jpeg;
   {
-    const py::gil_scoped_release release;
+    const Unlocked unlocked;
     const Bytes image = view.set->open.BytesOf(view.at, Plane::kImage);
     if (image) jpeg = io::SmallJpeg(report::Shrink(*image, max_side_px), kQuality);
   }
   return jpeg;
 }
 
+py::object PngOf(const SetView& view) {
+  std::string png;
+  {
+    const Unlocked unlocked;
+    const Bytes image = view.set->open.BytesOf(view.at, Plane::kImage);
+    if (image) png = io::EncodePng(report::Shrink(*image, kMaxNotebookPx));
+  }
+  if (png.empty()) return py::none();
+  return py::bytes(png);
+}
+
+[[noreturn]] py::object RejectPickling(const SetView& /*view*/, int /*protocol*/) {
+  throw py::type_error(
+      "View: a view is part of an open set and cannot be pickled; pass the set's `path` and the "
+      "view's `name`, and open it there: dtr.load(path)[name]");
+}
+
 py::dict UnprojectView(const SetView& view, bool completed) {
   Unprojected all;
   {
-    const py::gil_scoped_release release;
+    const Unlocked unlocked;
     all = Unproject(view.set->open, view.at, completed);
   }
   py::dict points;
@@ -116,28 +143,27 @@ py::dict UnprojectView(const SetView& view, bool completed) {
   points["sigma"] = ArrayOf(std::move(all.sigma));
   points["directions"] = ArrayOf(std::move(all.directions), 3);
   points["pixels"] = ArrayOf(std::move(all.pixels), 2);
-  points["completed"] = ArrayOf(std::move(all.completed)).attr("view")("bool");
+  points["completed"] = ArrayOf(std::move(all.completed), 1, py::dtype::of<bool>());
   return points;
 }
 
 // ---- cameras
 
-NovelFrame MakeCamera(const Eigen::Ref<const RowMajor3d>& k,
-                      const Eigen::Ref<const RowMajor4d>& cam_from_world, int width, int height,
-                      const std::string& name) {
-  return {name, CameraFrom(k, width, height, "Camera"), PoseFrom(cam_from_world, "Camera")};
-}
-
 NovelFrame CameraOf(const SetView& view) {
   return {view.view().id, view.view().camera, view.view().cam_from_world};
 }
 
-std::vector<NovelFrame> CamerasOf(const Set& set, pipeline::NovelCameraRequest request,
-                                  size_t time_step, const py::object& note) {
+std::vector<NovelFrame> CamerasOf(const Set& set, const pipeline::NovelCameraRequest& request,
+                                  size_t time_step, py::object note) {
+  Caller caller(py::none(), std::move(note));
   std::vector<std::string> notes;
-  std::vector<NovelFrame> cameras =
-      pipeline::NovelFrames(AtFrame(set.open.set(), time_step), request, &notes);
-  for (const std::string& line : notes) note(line);
+  std::vector<NovelFrame> cameras;
+  {
+    const Unlocked unlocked;
+    cameras = pipeline::NovelFrames(AtFrame(set.open.set(), time_step), request, &notes);
+  }
+  for (const std::string& line : notes) caller.Note(line);
+  caller.Raise();
   return cameras;
 }
 
@@ -145,7 +171,7 @@ std::vector<NovelFrame> CamerasOf(const Set& set, pipeline::NovelCameraRequest r
 
 std::shared_ptr<Set> Open(const std::filesystem::path& folder) {
   try {
-    const py::gil_scoped_release release;
+    const Unlocked unlocked;
     return std::make_shared<Set>(folder);
   } catch (const Error& error) {
     if (std::error_code none; !std::filesystem::exists(folder, none)) {
@@ -156,13 +182,13 @@ std::shared_ptr<Set> Open(const std::filesystem::path& folder) {
   }
 }
 
-std::vector<std::vector<SetView>> ViewsOf(const std::shared_ptr<Set>& set) {
+std::vector<std::vector<SetView>> ViewsOf(Set& set) {
   std::vector<std::vector<SetView>> steps;
-  const std::vector<Frame>& frames = set->open.set().frames;
+  const std::vector<Frame>& frames = set.open.set().frames;
   for (size_t step = 0; step < frames.size(); ++step) {
     steps.emplace_back();
     for (size_t i = 0; i < frames[step].views.size(); ++i) {
-      steps.back().push_back({set, {step, i}});
+      steps.back().push_back({set.shared_from_this(), {step, i}});
     }
   }
   return steps;
@@ -206,7 +232,7 @@ py::dict RenderImage(Set& set, const NovelFrame& camera, const std::string& opti
   Caller caller(py::none(), std::move(note));
   Rendered rendered;
   try {
-    const py::gil_scoped_release release;
+    const Unlocked unlocked(caller.stop());
     rendered = set.pool.Render(camera, options, settings, caller,
                                [&](std::future<Rendered>& drawn) { caller.WaitFor(drawn); });
   } catch (...) {
@@ -227,47 +253,6 @@ py::dict RenderImage(Set& set, const NovelFrame& camera, const std::string& opti
 }
 
 // ---- what Python sees
-
-void AddCamera(py::module_& module) {
-  py::class_<NovelFrame>(module, "Camera",
-                         "A pinhole camera at a place of a set's world.\n\n"
-                         "K: (3, 3) float64, pixels, origin at the outer corner of the top-left\n"
-                         "pixel (its centre is 0.5, 0.5). cam_from_world: (4, 4) float64,\n"
-                         "p_cam = R p_world + t; axes of the camera: x right, y down, z forward;\n"
-                         "scene units, relative to the set's world_origin.")
-      .def(py::init(&MakeCamera), py::arg("K"), py::arg("cam_from_world"), py::arg("width"),
-           py::arg("height"), py::arg("name") = "camera")
-      .def_readonly("name", &NovelFrame::name, "Of the view or file that it comes from.")
-      .def_property_readonly(
-          "K", [](const NovelFrame& c) { return ReadOnly(RowMajor3d(MatrixOf(c.camera))); },
-          "(3, 3) float64, pixels, read-only.")
-      .def_property_readonly(
-          "cam_from_world",
-          [](const NovelFrame& c) {
-            return ReadOnly(RowMajor4d(io::MatrixFromPose(c.cam_from_world)));
-          },
-          "(4, 4) float64, scene units, read-only.")
-      .def_property_readonly(
-          "size",
-          [](const NovelFrame& c) {
-            return py::make_tuple(c.camera.width_px(), c.camera.height_px());
-          },
-          "(width, height) in pixels.")
-      .def(
-          "resized",
-          [](const NovelFrame& c, int width, int height) {
-            NovelFrame resized = c;
-            resized.camera =
-                pipeline::WithSize(c.camera, std::to_string(width) + "x" + std::to_string(height));
-            return resized;
-          },
-          py::arg("width"), py::arg("height"),
-          "The same camera for another size of image; 0 for either side keeps the proportions.")
-      .def("__repr__", [](const NovelFrame& c) {
-        return "<dtr.Camera " + c.name + ", " + std::to_string(c.camera.width_px()) + "x" +
-               std::to_string(c.camera.height_px()) + ">";
-      });
-}
 
 void AddView(py::module_& module) {
   py::class_<SetView>(module, "View",
@@ -324,6 +309,8 @@ void AddView(py::module_& module) {
           "is depth**2 times it. None where the set has none.")
       .def("thumbnail", &ThumbnailOf, py::arg("max_side_px") = 160,
            "The image as a small JPEG file, bytes.")
+      .def("_repr_png_", &PngOf, "For notebooks: the image, at most 1024 pixels wide and high.")
+      .def("__reduce_ex__", &RejectPickling)
       .def("_unproject", &UnprojectView, py::arg("completed"))
       .def("_address", &AddressOf, py::arg("plane"),
            "Where the set has these pixels in memory, for tests.")
@@ -370,7 +357,7 @@ void AddSet(py::module_& module) {
            py::arg("note"))
       .def("drop_pixels",
            [](Set& s) {
-             const py::gil_scoped_release release;
+             const Unlocked unlocked;
              s.open.DropPixels();
              s.pool.Clear();
            })
@@ -422,6 +409,7 @@ void AddSet(py::module_& module) {
 PYBIND11_MODULE(_core, module) {
   module.doc() = "The C++ half of the package dtr. Use `import dtr`.";
   module.attr("__version__") = DTR_VERSION;
+  WatchEndOfInterpreter();
   AddJobs(module);
   AddCamera(module);
   AddView(module);

@@ -10,9 +10,11 @@
 #include "dtr/base/error.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/image_io.h"
+#include "dtr/report/contact_sheet.h"
 #include "python/core/arrays.h"
 #include "python/core/caller.h"
 #include "python/core/module.h"
+#include "python/core/unlocked.h"
 
 namespace dtr::python {
 namespace {
@@ -85,7 +87,7 @@ void WriteImage(const std::filesystem::path& file,
                 const py::array_t<std::uint8_t, py::array::c_style>& image) {
   RequireShape(image, 3, 3);
   const Grid<std::uint8_t> grid = GridFrom(image, 3);
-  const py::gil_scoped_release release;
+  const Unlocked unlocked;
   io::WritePng(file, grid);
 }
 
@@ -93,8 +95,19 @@ void WriteDepth(const std::filesystem::path& file,
                 const py::array_t<float, py::array::c_style>& depth) {
   RequireShape(depth, 2, 1);
   const Grid<float> grid = GridFrom(depth, 1);
-  const py::gil_scoped_release release;
+  const Unlocked unlocked;
   io::WriteExr(file, grid, false);
+}
+
+py::bytes PngOf(const py::array_t<std::uint8_t, py::array::c_style>& image) {
+  RequireShape(image, 3, 3);
+  const Grid<std::uint8_t> grid = GridFrom(image, 3);
+  std::string png;
+  {
+    const Unlocked unlocked;
+    png = io::EncodePng(report::Shrink(grid, kMaxNotebookPx));
+  }
+  return png;
 }
 
 }  // namespace
@@ -108,6 +121,8 @@ void AddJobs(py::module_& module) {
              "Write an image, shape (height, width, 3), uint8 sRGB, as PNG.");
   module.def("write_depth", &WriteDepth, py::arg("file"), py::arg("depth").noconvert(),
              "Write a depth map, shape (height, width), float32, as EXR.");
+  module.def("png", &PngOf, py::arg("image").noconvert(),
+             "The bytes of an image as PNG, at most 1024 pixels wide and high, for notebooks.");
 }
 
 }  // namespace dtr::python

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
+import unicodedata
 from pathlib import Path
 from typing import Any, Optional, Sequence, Union
 
@@ -14,13 +15,28 @@ from . import _core
 from ._jobs import PathLike, ProgressCallback, run
 from ._set import Set, load
 
+_MAX_DEPTH = 1e30  # as of depth maps that are imported: kMaxForeignDepth
+_MAX_NAME_BYTES = 200  # file systems hold 255, extensions among them
+
 
 def _fail(text: str) -> _core.UsageError:
     return _core.UsageError(text)
 
 
+def _array(values: Any, what: str) -> npt.NDArray[Any]:
+    try:
+        return np.asarray(values)
+    except ValueError:
+        raise _fail(f"{what}: expected an array, found lists of unequal lengths") from None
+
+
+def _shown(value: Any) -> str:
+    """A value in one line."""
+    return " ".join(repr(value).split())[:80]
+
+
 def _image(image: Any, what: str) -> npt.NDArray[np.uint8]:
-    array = np.asarray(image)
+    array = _array(image, what)
     if array.dtype != np.uint8 or array.ndim != 3 or array.shape[2] != 3 or 0 in array.shape:
         raise _fail(
             f"{what}: expected shape (height, width, 3) of uint8, sRGB, "
@@ -32,7 +48,7 @@ def _image(image: Any, what: str) -> npt.NDArray[np.uint8]:
 def _depth(depth: Any, what: str, image: npt.NDArray[np.uint8]) -> Optional[npt.NDArray[np.float32]]:
     if depth is None:
         return None
-    array = np.asarray(depth)
+    array = _array(depth, what)
     if array.dtype.kind != "f" or array.ndim != 2 or 0 in array.shape:
         raise _fail(
             f"{what}: expected shape (height, width) of floats, plane z in scene units, 0 for a "
@@ -46,18 +62,19 @@ def _depth(depth: Any, what: str, image: npt.NDArray[np.uint8]) -> Optional[npt.
         )
     with np.errstate(over="ignore"):
         narrow = np.ascontiguousarray(array, dtype=np.float32)
-    wrong = ~np.isfinite(narrow) | (narrow < 0)
+    wrong = ~((narrow >= 0) & (narrow <= _MAX_DEPTH))
     if wrong.any():
         y, x = np.argwhere(wrong)[0]
         raise _fail(
-            f"{what}: expected finite depths from 0 (a hole) on, found {array[y, x]} at x {x}, y {y}"
+            f"{what}: expected depths from 0 (a hole) to {_MAX_DEPTH:g}, found {array[y, x]} "
+            f"at x {x}, y {y}"
         )
     return narrow if narrow.any() else None  # as held-out views of a set are read
 
 
 def _matrices(values: Any, count: int, shapes: Sequence[tuple[int, int]], what: str) -> Any:
     """A stack of `count` float64 matrices."""
-    array = np.asarray(values)
+    array = _array(values, what)
     if array.dtype.kind not in "fiu" or array.shape[-2:] not in shapes or array.ndim not in (2, 3):
         raise _fail(
             f"{what}: expected numbers of shape (N, {shapes[0][0]}, {shapes[0][1]}), "
@@ -115,6 +132,11 @@ class ArraysSet:
         without = [c.name for c, depth in zip(self._cameras, self._depths) if depth is None]
         if not without:
             return {}
+        if any("," in name for name in without):
+            raise _fail(
+                "`names`: expected no comma in the name of a view without depth, found "
+                f"{next(name for name in without if ',' in name)!r}"
+            )
         if options.pop("holdout", None) is not None:
             raise _fail(
                 f"`holdout`: views without depth, as {without[0]}, are held out anyway; leave it "
@@ -175,15 +197,16 @@ def from_arrays(
 
     Everything is checked here. Raises UsageError (a ValueError) that names the array.
     """
+    images, depths = _list(images, "`images`"), _list(depths, "`depths`")
     count = len(images)
     if count == 0 or len(depths) != count:
         raise _fail(f"`depths`: expected one for each image, found {len(depths)} of {count}")
     if unit not in ("metre", "arbitrary", "unknown"):
-        raise _fail(f"`unit`: expected metre, arbitrary or unknown, found {unit!r}")
-    origin = np.asarray(world_origin, dtype=np.float64)
-    if origin.shape != (3,) or not np.isfinite(origin).all():
-        raise _fail(f"`world_origin`: expected 3 finite numbers, found {world_origin!r}")
-    chosen = [f"{i:04}" for i in range(count)] if names is None else list(names)
+        raise _fail(f"`unit`: expected metre, arbitrary or unknown, found {_shown(unit)}")
+    origin = _array(world_origin, "`world_origin`")
+    if origin.shape != (3,) or origin.dtype.kind not in "fiu" or not np.isfinite(origin).all():
+        raise _fail(f"`world_origin`: expected 3 finite numbers, found {_shown(world_origin)}")
+    chosen = [f"{i:04}" for i in range(count)] if names is None else _list(names, "`names`")
     _check_names(chosen, count)
     checked_images = [_image(image, f"`images` {i}") for i, image in enumerate(images)]
     checked_depths = [
@@ -201,12 +224,33 @@ def from_arrays(
             )
         except _core.Error as error:
             raise _fail(f"view {i}: {error}") from None
-    return ArraysSet(checked_images, checked_depths, cameras, unit, origin.tolist())
+    return ArraysSet(
+        checked_images, checked_depths, cameras, unit, origin.astype(np.float64).tolist()
+    )
 
 
-def _check_names(names: Sequence[str], count: int) -> None:
+def _list(values: Any, what: str) -> list[Any]:
+    try:
+        if not isinstance(values, (str, bytes)):
+            return list(values)
+    except TypeError:
+        pass  # it has no items
+    raise _fail(f"{what}: expected a list with one for each view, found {_shown(values)}")
+
+
+def _check_names(names: Sequence[Any], count: int) -> None:
+    for name in names:
+        if not _is_file_name(name):
+            raise _fail(f"`names`: expected names of files, found {_shown(name)}")
     if len(names) != count or len(set(names)) != count:
         raise _fail(f"`names`: expected {count} different ones, found {len(set(names))}")
-    for name in names:
-        if not name or name.startswith(".") or any(c in name for c in "/\\\0"):
-            raise _fail(f"`names`: expected names of files, found {name!r}")
+
+
+def _is_file_name(name: Any) -> bool:
+    """Also one that a line of text may hold."""
+    if not isinstance(name, str) or not name or name.startswith("."):
+        return False
+    no_text = ("Cc", "Cs", "Zl", "Zp")  # control characters, halves of characters, ends of lines
+    if any(c in "/\\" or unicodedata.category(c) in no_text for c in name):
+        return False
+    return len(name.encode()) <= _MAX_NAME_BYTES

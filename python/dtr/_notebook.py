@@ -72,6 +72,14 @@ class Page:
             f'style="border:0" allowfullscreen></iframe>'
         )
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self._folder is not None:
+            raise TypeError(
+                "Page: its file ends with it, so it cannot be pickled; make it by page(path), which "
+                "keeps the file"
+            )
+        return Page, (self._path, self._height)
+
     def __repr__(self) -> str:
         return f"<dtr.Page {self._path}>"
 

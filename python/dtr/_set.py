@@ -5,7 +5,20 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import dataclass
-from typing import Any, Iterable, Optional, Sequence, Union
+from functools import partial
+from typing import (
+    Any,
+    Callable,
+    Iterable,
+    Iterator,
+    NoReturn,
+    Optional,
+    Sequence,
+    SupportsIndex,
+    Tuple,
+    Union,
+    overload,
+)
 
 import numpy as np
 import numpy.typing as npt
@@ -18,15 +31,56 @@ from ._jobs import PathLike, ProgressCallback, note, python_messages, run
 PLANES = ("image", "mask", "depth", "completed_depth", "sigma")
 
 
+class Views(Tuple[View, ...]):
+    """Views of a time step in order: `views[3]`, or by the photo's name, `views["0003"]`.
+
+    Names may be without their extension. `"0003" in views` is True where there is that view.
+    """
+
+    _index_of: Callable[[str], int]
+
+    def __new__(cls, views: Iterable[View], index_of: Callable[[str], int]) -> Views:
+        made = super().__new__(cls, tuple(views))
+        made._index_of = index_of
+        return made
+
+    @overload
+    def __getitem__(self, at: SupportsIndex) -> View: ...
+    @overload
+    def __getitem__(self, at: slice) -> tuple[View, ...]: ...
+    @overload
+    def __getitem__(self, at: str) -> View: ...
+    def __getitem__(self, at: Union[SupportsIndex, slice, str]) -> Union[View, tuple[View, ...]]:
+        if isinstance(at, str):
+            with python_messages():
+                at = self._index_of(at)
+        return super().__getitem__(at)
+
+    def __contains__(self, view: object) -> bool:
+        if not isinstance(view, str):
+            return super().__contains__(view)
+        try:
+            self._index_of(view)
+        except _core.UsageError:
+            return False
+        return True
+
+    def __repr__(self) -> str:
+        names = [view.name for view in self]
+        shown = names if len(names) <= 4 else [*names[:2], "...", names[-1]]
+        return f"<dtr.Views {len(names)}: {', '.join(shown)}>"
+
+
 @dataclass(frozen=True)
 class TimeStep:
     """The views of one moment; a still scene has one time step."""
 
     time_s: float
-    views: tuple[View, ...]
+    views: Views
 
 
-@dataclass(frozen=True)
+# Compared as objects are: arrays have no one answer to ==.
+@dataclass(frozen=True, eq=False, repr=False)
 class Frame:
     """A rendered image. All arrays have the size of its camera.
 
@@ -46,8 +100,18 @@ class Frame:
     skipped: list[tuple[str, str]]
     coverage_share: float
 
+    def _repr_png_(self) -> bytes:
+        return _core.png(self.image)
 
-@dataclass(frozen=True)
+    def __repr__(self) -> str:
+        height, width = self.image.shape[:2]
+        return (
+            f"<dtr.Frame {self.camera.name}, {width}x{height} of {len(self.views_used)} views, "
+            f"{100 * self.coverage_share:.1f} % seen>"
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Points:
     """A view's pixels with depth as points, row by row of the depth map.
 
@@ -67,6 +131,14 @@ class Points:
 
     def __len__(self) -> int:
         return len(self.points)
+
+    def __repr__(self) -> str:
+        text = f"<dtr.Points {len(self)}"
+        if self.completed.any():
+            text += f", {self.completed.sum()} of them completed"
+        if np.isfinite(self.sigma).any():
+            text += f", median sigma {np.nanmedian(self.sigma):.3g}"
+        return text + ">"
 
 
 def load(path: PathLike) -> Set:
@@ -88,7 +160,8 @@ class Set:
         self._open = opened
         self._path = path
         self._time_steps = tuple(
-            TimeStep(time, tuple(views)) for time, views in zip(opened.times_s, opened.views())
+            TimeStep(time, Views(views, partial(opened.index_of, time_step=i)))
+            for i, (time, views) in enumerate(zip(opened.times_s, opened.views()))
         )
 
     # ---- description
@@ -131,9 +204,25 @@ class Set:
         return self._time_steps
 
     @property
-    def views(self) -> tuple[View, ...]:
-        """Those of the first time step, held-out ones too."""
-        return self._time_steps[0].views if self._time_steps else ()
+    def views(self) -> Views:
+        """Those of the first time step, held-out ones too: `views[3]`, `views["0003"]`."""
+        return self._time_steps[0].views
+
+    def __len__(self) -> int:
+        return len(self.views)
+
+    @overload
+    def __getitem__(self, at: Union[SupportsIndex, str]) -> View: ...
+    @overload
+    def __getitem__(self, at: slice) -> tuple[View, ...]: ...
+    def __getitem__(self, at: Union[SupportsIndex, slice, str]) -> Union[View, tuple[View, ...]]:
+        return self.views[at]
+
+    def __iter__(self) -> Iterator[View]:
+        return iter(self.views)
+
+    def __contains__(self, view: object) -> bool:
+        return view in self.views
 
     def view(self, name: str, time_step: int = 0) -> View:
         """The view of that photo, with or without its extension. Raises UsageError."""
@@ -306,6 +395,9 @@ class Set:
 
     def _repr_html_(self) -> str:
         return _notebook.contact_sheet(self)
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("Set: an open set cannot be pickled; pass its `path`, and dtr.load it there")
 
     def __repr__(self) -> str:
         views = self.views

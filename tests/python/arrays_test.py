@@ -79,6 +79,23 @@ class RoundTrip(WithSet):
             made.save(target)
         made.save(target, force=True)
 
+    def test_names_with_commas(self):
+        images, depths, K, poses = wall(4)
+        names = ["a,b", "c d", "é", "e"]
+        made = dtr.from_arrays(images, depths, K, poses, names=names)
+        s = made.save(self.folder / "commas.dtr", completion=False)
+        self.assertEqual([v.name for v in s.views], [f"{name}.png" for name in names])
+        depths[0] = None
+        with self.assertRaisesRegex(dtr.UsageError, "`names`: expected no comma .*, found 'a,b'"):
+            dtr.from_arrays(images, depths, K, poses, names=names).save(self.folder / "never.dtr")
+
+    def test_depth_of_any_scene(self):
+        for scale in (1e-30, 1e-6, 1e6, 1e30):
+            images, depths, K, poses = wall(z=scale)
+            poses[:, 0, 3] *= scale
+            s = dtr.from_arrays(images, depths, K, poses).save(self.folder / f"{scale}.dtr")
+            np.testing.assert_allclose(s["0001"].depth, depths[1], rtol=1e-3)
+
     def test_poses_of_three_rows_and_integers(self):
         images, depths, K, poses = wall()
         made = dtr.from_arrays(np.stack(images), np.stack(depths).astype(np.float64), K.astype(int),
@@ -114,10 +131,10 @@ class Hostile(unittest.TestCase):
             return lambda a: a["depths"].__setitem__(2, depth)
 
         bad = np.full((32, 48), 4, np.float32)
-        for value in (np.nan, np.inf, -np.inf, -1, 1e300):
+        for value in (np.nan, np.inf, -np.inf, -1, 1e300, 3e38):
             wrong = bad.astype(np.float64)
             wrong[7, 11] = value
-            self.rejected("`depths` 2: expected finite depths .* at x 11, y 7", spoil(wrong))
+            self.rejected(r"`depths` 2: expected depths from 0 \(a hole\) to 1e\+30, .* at x 11, y 7", spoil(wrong))
         self.rejected("`depths` 2: .*a whole fraction", spoil(np.ones((31, 48), np.float32)))
         self.rejected("`depths` 2: .*a whole fraction", spoil(np.ones((64, 96), np.float32)))
         self.rejected("`depths` 2: .*found .* of int64", spoil(np.ones((32, 48), np.int64)))
@@ -152,6 +169,28 @@ class Hostile(unittest.TestCase):
         self.rejected("`names`: expected names of files", lambda a: None, names=["a", "", "c"])
         self.rejected("`world_origin`", lambda a: None, world_origin=[0, 0, np.inf])
         self.rejected("`world_origin`", lambda a: None, world_origin=[0, 0])
+        for wrong in ("here", "123", ["1", "2", "3"], None, [0, 0, 1j], np.zeros((3, 3))):
+            self.rejected("`world_origin`: expected 3 finite numbers, found", lambda a: None, world_origin=wrong)
+
+    def test_names_that_no_line_may_hold(self):
+        for wrong in ("a\nb", "a\x00b", "\x1b[31m", "a\u2028b", "\ud800", 7, None, b"a", "a" * 250):
+            self.rejected("`names`: expected names of files, found", lambda a: None, names=["a", wrong, "c"])
+        self.rejected("`names`: expected a list", lambda a: None, names="abc")
+
+    def test_ragged_lists(self):
+        self.rejected("`K`: expected an array, found lists of unequal lengths",
+                      lambda a: a.update(K=[[40, 0, 24], [0, 40], [0, 0, 1]]))
+        self.rejected("`poses`: expected an array, found lists", lambda a: a.update(poses=[np.eye(4), [[1]]]))
+        self.rejected("`world_origin`: expected an array, found lists", lambda a: None, world_origin=[[1], 2, 3])
+        self.rejected("`images` 1: expected an array, found lists",
+                      lambda a: a["images"].__setitem__(1, [[[1, 2, 3]], [[1, 2]]]))
+        self.rejected("`depths` 1: expected an array, found lists", lambda a: a["depths"].__setitem__(1, [[1.0], []]))
+
+    def test_what_is_no_list(self):
+        for name in ("images", "depths"):
+            for wrong in (5, None, "text", np.float64(3), np.array(3)):
+                self.rejected(f"`{name}`: expected a list with one for each view, found",
+                              lambda a: a.update({name: wrong}))
 
     def test_cameras_alone(self):
         for size in ((0, 10), (10, -1), (1 << 20, 10)):

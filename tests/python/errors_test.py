@@ -3,6 +3,9 @@
 import ast
 import re
 import shutil
+import subprocess
+import sys
+import tempfile
 import unittest
 from pathlib import Path
 
@@ -41,6 +44,31 @@ class Page(unittest.TestCase):
         self.assertGreater(len(named), 20)
         for name in named:
             self.assertIn(f"def {name}(", tests)
+
+
+class Import(unittest.TestCase):
+    def imported_from(self, folder):
+        done = subprocess.run([sys.executable, "-c", "import dtr"], capture_output=True, text=True,
+                              env={"PYTHONPATH": str(folder), "PATH": "/usr/bin:/bin"}, cwd=folder)
+        self.assertEqual(done.returncode, 1)
+        return done.stderr.splitlines()[-1]
+
+    def test_without_the_module(self):
+        with tempfile.TemporaryDirectory(prefix="dtr-test-") as folder:
+            package = Path(folder) / "dtr"
+            shutil.copytree("python/dtr", package, ignore=shutil.ignore_patterns("__pycache__"))
+            self.assertEqual(self.imported_from(folder),
+                             "ImportError: dtr._core is not built; build it: cmake --preset release && "
+                             "cmake --build --preset release --target dtr_python")
+            (package / "_core.cpython-32-x86_64-linux-gnu.so").write_text("")
+            self.assertRegex(self.imported_from(folder),
+                             r"^ImportError: dtr\._core is built for another Python \(_core\.cpython-32-.*\), this is "
+                             r"/.* of version 3\.\d+; start that one, on Debian /usr/bin/python3$")
+            # A module that does not load says why.
+            shutil.copy(dtr._core.__file__, package)
+            broken = package / Path(dtr._core.__file__).name
+            broken.write_bytes(broken.read_bytes()[:4000])
+            self.assertIn(broken.name, self.imported_from(folder))
 
 
 class Errors(WithSet):

@@ -1,5 +1,7 @@
 #include "pipeline/detail/import/import_depth.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <vector>
 
@@ -31,7 +33,19 @@ DepthImage ToPlaneZOfDistorted(DepthImage depth, const io::NamedCamera& named,
   return z;
 }
 
+// Depth is completed up to 50 times the farthest, and squared in places; floats hold 3.4e38.
+constexpr float kMaxForeignDepth = 1e30f;
+
 }  // namespace
+
+void RequireDepthInRange(const DepthImage& depth, const fs::path& file) {
+  const std::vector<float>& all = depth.grid().data();
+  const auto far = std::ranges::find_if(all, [](float z) { return z > kMaxForeignDepth; });
+  if (far == all.end()) return;
+  throw Error(fmt::format(
+      "{}: expected depths up to {:g}, found {:g}; give 0 (a hole) where nothing was measured",
+      file.string(), kMaxForeignDepth, *far));
+}
 
 std::vector<fs::path> DepthFilesOf(const io::NamedCamera& named, const ImportOptions& options) {
   std::vector<fs::path> found;

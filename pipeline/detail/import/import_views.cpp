@@ -267,6 +267,7 @@ View ViewOf(const io::NamedCamera& named, const std::string& id, const ImportOpt
   if (note.alpha_masks) BlackenMasked(view);
   if (HasDepth(named, options)) {
     view.depth = ReadCameraDepth(named, options, distortion.get(), note.resampled);
+    RequireDepthInRange(view.depth, DepthFileOf(named, options));
     view.depth_scale = view.camera.width_px() / view.depth.width();
     RemoveMaskedDepth(view);
   }
