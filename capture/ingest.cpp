@@ -46,11 +46,16 @@ std::string CameraGroup(const Photo& photo, const io::ImageHeader& header) {
   return group;
 }
 
+io::ImageHeader ReadHeader(const fs::path& file, MemoryBudget& memory) {
+  const auto share = memory.Take(io::BytesToReadHeader(file));
+  return io::ReadImageHeader(file, memory.gb());
+}
+
 Photo InspectPhoto(const fs::path& file, const std::string& name, const fs::path& mask, bool screen,
                    MemoryBudget& memory, std::vector<std::string>& remarks) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) throw Error("is no regular file");
-  const io::ImageHeader header = io::ReadImageHeader(file);
+  const io::ImageHeader header = ReadHeader(file, memory);
   remarks = header.remarks;
   Photo photo;
   photo.name = name;
@@ -70,9 +75,11 @@ Photo InspectPhoto(const fs::path& file, const std::string& name, const fs::path
   photo.raw_balance = header.raw_balance;
   photo.panorama = header.panorama;
   photo.camera_group = CameraGroup(photo, header);
+  photo.read_bytes = header.read_bytes;
+  RequireMemoryFor(photo, memory.gb());
   photo.source_sha256 = Sha256OfFile(file);
   if (mask.empty() && !screen && !header.has_alpha) return photo;
-  const auto share = memory.TakeForPhoto(photo.width_px, photo.height_px);
+  const auto share = memory.Take(MemoryOf(photo));
   if (!mask.empty()) {
     photo.mask_file = mask;
     photo.mask_sha256 = Sha256OfFile(mask);
@@ -135,6 +142,19 @@ void BalanceRawPhotos(std::vector<Photo>& photos, Progress& progress) {
         "{:.3g}, blue {:.3g} of green; the camera's differ by {:.0f} %)",
         group.size(), camera, chosen[0], chosen[2], 100 * (spread - 1)));
   }
+}
+
+// A capture that was made with more memory, or whose list says what it likes.
+void SkipTooLarge(Capture& capture, double memory_gb) {
+  std::erase_if(capture.photos, [&](const Photo& photo) {
+    try {
+      RequireMemoryFor(photo, memory_gb);
+      return false;
+    } catch (const Error& e) {
+      capture.skipped.push_back({photo.name, ReasonFrom(e.what(), photo.file, photo.name)});
+      return true;
+    }
+  });
 }
 
 // The first thing that a command says of a folder.
@@ -225,6 +245,7 @@ Capture IngestPhotos(const fs::path& folder, const IngestOptions& options, Progr
   }
   if (fs::exists(folder / kCaptureFile, error)) {
     Capture stored = ReadCapture(folder);
+    SkipTooLarge(stored, options.memory_gb);
     Announce(stored, progress);
     return stored;
   }
@@ -236,7 +257,7 @@ Capture IngestPhotos(const fs::path& folder, const IngestOptions& options, Progr
   FolderWalk walk = WalkFolder(folder, options.recurse);
   Layout listing;
   if (options.sort) {
-    listing = SortImages(folder, walk.images, std::move(walk.contents));
+    listing = SortImages(folder, walk.images, std::move(walk.contents), options.memory_gb);
   } else {
     listing.photos = walk.images;
     listing.contents = std::move(walk.contents);

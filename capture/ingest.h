@@ -17,8 +17,8 @@ struct IngestOptions {
   /// Decode every photo: finds damaged ones now instead of hours later, and measures the rest.
   bool screen = true;
   int threads = 0;  ///< 0: all cores
-  /// Photos in memory at a time take at most so many 1e9 bytes (one alone may be larger); 0: no
-  /// bound. Changes nothing of the result.
+  /// Photos in memory at a time take at most so many 1e9 bytes, and one that alone takes more is
+  /// skipped; 0: no bound.
   double memory_gb = 0;
 };
 

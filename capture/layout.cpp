@@ -44,8 +44,9 @@ std::vector<std::string> SamplesOf(const Folder& folder, const std::vector<std::
 
 class Sorter {
  public:
-  Sorter(const fs::path& top, const std::vector<std::string>& images, FolderContents contents)
-      : top_(top), looks_(top), rest_(images.begin(), images.end()) {
+  Sorter(const fs::path& top, const std::vector<std::string>& images, FolderContents contents,
+         double memory_gb)
+      : top_(top), looks_(top, memory_gb), rest_(images.begin(), images.end()) {
     layout_.contents = std::move(contents);
   }
 
@@ -397,8 +398,8 @@ void Sorter::AssignMasks() {
 }  // namespace
 
 Layout SortImages(const fs::path& folder, const std::vector<std::string>& images,
-                  FolderContents contents) {
-  return Sorter(folder, images, std::move(contents)).Sort();
+                  FolderContents contents, double memory_gb) {
+  return Sorter(folder, images, std::move(contents), memory_gb).Sort();
 }
 
 }  // namespace dtr::capture

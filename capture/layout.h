@@ -35,8 +35,9 @@ struct Layout {
 ///   known to write (COLMAP's undistorted images, OpenDroneMap's, Meshroom's results);
 /// - raw files beside a developed photo of their name.
 /// Folders of several cameras with equal names show different things, and all stay photos. What a
-/// folder holds is decided by several samples that agree: a camera may begin in the dark.
+/// folder holds is decided by several samples that agree: a camera may begin in the dark. Images
+/// that take more than `memory_gb` to read (1e9 bytes; 0: no bound) are taken for photos.
 Layout SortImages(const std::filesystem::path& folder, const std::vector<std::string>& images,
-                  FolderContents contents);
+                  FolderContents contents, double memory_gb = io::kImageMemoryGb);
 
 }  // namespace dtr::capture

@@ -104,7 +104,7 @@ const ImageSize& Looks::SizeOf(const std::string& name) {
   const auto [entry, is_new] = sizes_.try_emplace(name);
   if (!is_new) return entry->second;
   try {
-    const io::ImageHeader header = io::ReadImageHeader(folder_ / name);
+    const io::ImageHeader header = io::ReadImageHeader(folder_ / name, memory_gb_);
     const bool sideways = header.exif_orientation >= 5;
     entry->second = {sideways ? header.height_px : header.width_px,
                      sideways ? header.width_px : header.height_px,
@@ -122,7 +122,8 @@ const ImageLook& Looks::LookOf(const std::string& name) {
   const auto [entry, is_new] = looks_.try_emplace(name);
   if (!is_new) return entry->second;
   try {
-    entry->second = LookAtPixels(io::ReadImage(folder_ / name, {.apply_exif_orientation = true}));
+    entry->second = LookAtPixels(io::ReadImage(
+        folder_ / name, {.apply_exif_orientation = true, .memory_gb = memory_gb_}));
   } catch (const Error&) {
     // As above.
   }

@@ -35,7 +35,9 @@ struct ImageLook {
 /// Reads each file at most once.
 class Looks {
  public:
-  explicit Looks(const std::filesystem::path& folder) : folder_(folder) {}
+  /// `memory_gb`: as io::ImageReadOptions; images that take more are unreadable.
+  Looks(const std::filesystem::path& folder, double memory_gb)
+      : folder_(folder), memory_gb_(memory_gb) {}
   const ImageSize& SizeOf(const std::string& name);
   const ImageLook& LookOf(const std::string& name);
 
@@ -51,6 +53,7 @@ class Looks {
 
  private:
   std::filesystem::path folder_;
+  double memory_gb_;
   std::map<std::string, ImageSize> sizes_;
   std::map<std::string, ImageLook> looks_;
 };

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "dtr/base/error.h"
+#include "dtr/base/memory_budget.h"
 
 namespace dtr::capture {
 namespace {
@@ -82,6 +83,17 @@ void DropFaulty(Capture& capture, const std::vector<Fault>& faults) {
             [](const Skipped& a, const Skipped& b) { return a.name < b.name; });
 }
 
+double MemoryOf(const Photo& photo) {
+  return std::max(photo.read_bytes, kBytesPerPhotoPixel * photo.width_px * photo.height_px);
+}
+
+void RequireMemoryFor(const Photo& photo, double memory_gb) {
+  RequireMemory(MemoryOf(photo), memory_gb,
+                fmt::format("{}: reading its {}x{} pixels", photo.file.string(), photo.width_px,
+                            photo.height_px),
+                "give more, or shrink the photo");
+}
+
 StoredSize StoredSizeOf(const Photo& photo) {
   const bool swapped = !photo.as_stored && photo.exif_orientation >= 5;
   return {swapped ? photo.height_px : photo.width_px, swapped ? photo.width_px : photo.height_px,
@@ -113,9 +125,20 @@ void RequireEnoughPhotos(const Capture& capture, const std::filesystem::path& wh
 
 namespace {
 
+// Files that took the place of what was ingested must not be much larger: whoever reads has looked
+// for room by the sizes of then. Others are read, to name their size.
+std::uint64_t LimitOf(const Photo& photo) {
+  constexpr std::uint64_t kAlways = 4 << 20;
+  return std::max(kAlways, static_cast<std::uint64_t>(photo.width_px) *
+                               static_cast<std::uint64_t>(photo.height_px));
+}
+
 io::ImageAndMask ReadOnGrid(const Photo& photo) {
-  io::ImageAndMask read = io::ReadImageAndMask(
-      photo.file, {.apply_exif_orientation = !photo.as_stored, .raw_balance = photo.raw_balance});
+  io::ImageAndMask read =
+      io::ReadImageAndMask(photo.file, {.apply_exif_orientation = !photo.as_stored,
+                                        .raw_balance = photo.raw_balance,
+                                        .limit_px = std::min(LimitOf(photo), io::kImageLimitPx),
+                                        .memory_gb = 0});
   const ImageRgb8& image = read.image;
   if (image.width() != photo.width_px || image.height() != photo.height_px) {
     throw Error(photo.file.string() + ": expected a photo of " + std::to_string(photo.width_px) +
@@ -132,7 +155,7 @@ bool LeavesNothing(const Mask& mask) {
 }
 
 Mask ReadMaskFile(const Photo& photo) {
-  Mask mask = OnGridOf(photo, io::ReadMask(photo.mask_file));
+  Mask mask = OnGridOf(photo, io::ReadMask(photo.mask_file, LimitOf(photo)));
   if (mask.width() != photo.width_px || mask.height() != photo.height_px) {
     throw Error(
         fmt::format("{}: expected a mask of {}x{} pixels as its photo {} upright, found {}x{}",

@@ -91,6 +91,7 @@ struct Photo {
   /// Whether part of the photo is not to be used, by its mask file or its alpha.
   bool HasMask() const { return !mask_file.empty() || (alpha && alpha->masks); }
 
+  double read_bytes = 0;      ///< io::ImageHeader::read_bytes; not stored with a capture: 0
   std::string source_sha256;  ///< of the original file
   std::optional<Screening> screening;
 };
@@ -123,6 +124,11 @@ void DropFaulty(Capture& capture, const std::vector<Fault>& faults);
 inline constexpr char kTurnedGroup[] = "|turned";
 /// Whether EXIF data turned the photo upright, or a capture that it comes from did.
 bool IsTurned(const Photo& photo);
+
+/// Memory that a photo takes while it is looked at, rotated or written, bytes.
+double MemoryOf(const Photo& photo);
+/// Throws Error where that is more than the limit, 1e9 bytes (0: none).
+void RequireMemoryFor(const Photo& photo, double memory_gb);
 
 /// Size of the file's pixels, before the EXIF orientation.
 StoredSize StoredSizeOf(const Photo& photo);

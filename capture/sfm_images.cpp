@@ -65,7 +65,7 @@ void PrepareMask(const Photo& photo, const fs::path& to, int max_size_px) {
 }
 
 void PreparePhoto(const Photo& photo, const fs::path& to, int max_size_px) {
-  const io::ImageHeader header = io::ReadImageHeader(photo.file);
+  const io::ImageHeader header = io::ReadImageHeader(photo.file, 0);
   const auto size = TargetSize(photo.width_px, photo.height_px, max_size_px);
   const bool readable_by_colmap = (header.format == "jpeg" || header.format == "png") &&
                                   header.bits == 8 && !header.converted &&
@@ -92,7 +92,7 @@ void PrepareSfmImages(const Capture& capture, const fs::path& folder, int max_si
   ParallelFor(0, count, threads, [&](int i) {
     progress.ThrowIfInterrupted();
     const Photo& photo = capture.photos[static_cast<size_t>(i)];
-    const auto share = memory.TakeForPhoto(photo.width_px, photo.height_px);
+    const auto share = memory.Take(MemoryOf(photo));
     PreparePhoto(photo, folder / photo.name, max_size_px);
     if (photo.HasMask()) PrepareMask(photo, SfmMaskFile(folder, photo), max_size_px);
     progress.Update(++done);

@@ -172,8 +172,7 @@ void CaptureWriter::Write(const Capture& capture, Progress& progress) {
   ParallelFor(0, count, state_->options.threads, [&](int i) {
     progress.ThrowIfInterrupted();
     const auto index = static_cast<size_t>(i);
-    const auto share =
-        memory.TakeForPhoto(capture.photos[index].width_px, capture.photos[index].height_px);
+    const auto share = memory.Take(MemoryOf(capture.photos[index]));
     stored.photos[index] = StorePhoto(capture.photos[index], partial);
     progress.Update(++done);
   });

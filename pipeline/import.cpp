@@ -232,6 +232,7 @@ ImportReport Import(ImportRequest request, Progress& listener) {
                                             .depth = request.depth,
                                             .masks = request.masks,
                                             .allow_missing = request.allow_missing});
+  io::RequireComputable(cameras.list, request.cameras.string());
   for (const std::string& note : cameras.notes) progress.Note(note);
   TakeFolders(cameras, request);
   if (request.refine && !request.depth.empty()) {

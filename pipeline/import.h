@@ -29,7 +29,7 @@ struct ImportRequest {
   bool force = false;                   ///< replace a set that exists
   bool refine = false;                  ///< adjust the cameras, where held-out observations gain
   bool completion = true;               ///< of depth that is imported (CompleteDepth)
-  double memory_gb = 4;                 ///< for views in memory at a time (one may be larger)
+  double memory_gb = 4;                 ///< for views in memory at a time
   int threads = 0;
   std::uint64_t seed = 0;
 };

@@ -2,15 +2,19 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/lower_case.h"
+#include "dtr/base/memory_budget.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/video.h"
+#include "dtr/render/frame.h"
+#include "dtr/render/frame_memory.h"
 #include "dtr/render/scene.h"
 #include "dtr/render/time_steps.h"
 #include "dtr/render/view_stream.h"
@@ -97,6 +101,27 @@ std::vector<NovelFrame> CamerasOf(const RenderRequest& request, const DtrSet& se
   return all;
 }
 
+// Before anything is allocated: files of cameras say what they like.
+void RequireMemoryForFrames(const RenderRequest& request, const std::vector<NovelFrame>& frames) {
+  const NovelCameraRequest& from = request.cameras;
+  const fs::path& file = from.camera_file.empty() ? from.path_file : from.camera_file;
+  const bool video = request.output.extension() == ".mp4";
+  for (const NovelFrame& frame : frames) {
+    CheckNovelCamera(frame.camera, frame.cam_from_world);
+    RequireFrameMemory(frame.camera, video, request.memory_gb,
+                       (file.empty() ? "" : file.string() + ": ") + frame.name);
+  }
+}
+
+// What the largest frame leaves of the memory to views.
+double BytesForViews(const RenderRequest& request, const std::vector<NovelFrame>& frames) {
+  double bytes = request.memory_gb * kBytesPerGigabyte;
+  for (const NovelFrame& frame : frames) {
+    bytes = std::min(bytes, dtr::BytesForViews(frame.camera, request.memory_gb));
+  }
+  return bytes;
+}
+
 // The frame of the set that rendered frame `i` shows; paths run through time.
 size_t FrameShown(const RenderRequest& request, const DtrSet& set, size_t i, size_t count) {
   return request.frame ? *request.frame : TimeStepOfImage(i, count, set.frames.size());
@@ -119,11 +144,14 @@ RenderReport Render(const RenderRequest& request,
   const DtrSet described = io::ReadSet(request.set);
   const auto cameras = CamerasOf(request, described, progress);
   RequireOneOutput(request);
+  RequireMemoryForFrames(request, cameras);
   const eval::RenderFunction draw = make_renderer();
   RenderOptions render = request.render;
   render.threads = request.threads;
   DynamicScene moving(request.set, described, request.exclude,
-                      {request.memory_gb, render.threads, request.measured_only}, progress);
+                      {request.memory_gb, render.threads, request.measured_only,
+                       BytesForViews(request, cameras)},
+                      progress);
   const auto shown = [&](size_t i) { return FrameShown(request, described, i, cameras.size()); };
   moving.At(shown(0));  // names are checked here
 

@@ -37,7 +37,7 @@ struct RenderRequest {
   RenderOptions render;
   bool force = false;          ///< images of several frames may replace files
   bool measured_only = false;  ///< drawn without completed depth
-  double memory_gb = 4;        ///< for the views' pixels; others are dropped and read again
+  double memory_gb = 4;        ///< for an image and views' pixels; others are read again
   int threads = 0;
 
   bool several() const { return play || cameras.several(); }

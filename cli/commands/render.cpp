@@ -112,7 +112,8 @@ void AddRenderCommand(CLI::App& app) {
         AddMeasuredOnly(command, options->request.measured_only);
         AddRendererOptions(command, options->renderer);
         AddMemoryOption(command, options->request.memory_gb,
-                        "Memory for the views' pixels; others are dropped and read again [4]");
+                        "Memory for an image and the views' pixels; views beyond it are dropped "
+                        "and read again [4]");
         command
             .add_option("--depth-out", options->request.depth_out, "Write the depth as float EXR")
             ->type_name("FILE");

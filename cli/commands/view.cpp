@@ -10,6 +10,7 @@
 
 #include "cli/command.h"
 #include "cli/output_file.h"
+#include "cli/prompt_end.h"
 #include "cli/render_arguments.h"
 #include "cli/render_options.h"
 #include "cli/renderers.h"
@@ -20,6 +21,7 @@
 #include "dtr/base/memory_budget.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/validation_result.h"
+#include "dtr/render/frame_memory.h"
 #include "dtr/render/time_steps.h"
 #include "pipeline/novel_frames.h"
 #include "pipeline/set_stream.h"
@@ -234,8 +236,10 @@ std::vector<NovelCamera> CamerasOf(const std::vector<pipeline::NovelFrame>& fram
   return cameras;
 }
 
-viewer::Host MakeHost(const Options& options, const Context& context) {
+viewer::Host MakeHost(const Options& options, const Context& context, PromptEnd& end) {
   viewer::Host host;
+  host.stop_requested = [&] { return context.console.StopRequested(); };
+  host.writing = [&](bool begins) { end.Hold(begins); };
   host.open = [&] { return Open(options, context); };
   host.stamp = [&] { return FileStamp(options.set / "set.json"); };  // written last
   host.view_stamp = [&](const View& view) { return ViewStampOf(options.set, view); };
@@ -284,6 +288,7 @@ viewer::AppSettings SettingsOf(const Options& options, const Context& context, c
   viewer::AppSettings settings;
   settings.hidden = pipeline::ResolveViewNames(AtFrame(set, options.time_step), options.exclude);
   const PinholeCamera size = pipeline::WithSize({1280, 800, 1, 1, 0, 0}, options.size);
+  RequireFrameMemory(size, false, options.memory_gb, "window");
   settings.warning = io::ValidationWarning(set);
   settings.title = WithoutTrailingSlash(options.set).filename().string() + " - dtr view";
   if (!settings.warning.empty()) settings.title += " - " + settings.warning;
@@ -341,8 +346,10 @@ int RunView(const Options& options, const Context& context) {
   const DtrSet set = io::ReadSet(options.set);
   const std::string warning = io::ValidationWarning(set);
   if (!warning.empty()) context.console.Note(warning);
+  PromptEnd end(context.console);
   const viewer::AppReport report =
-      viewer::RunViewer(SettingsOf(options, context, set), MakeHost(options, context));
+      viewer::RunViewer(SettingsOf(options, context, set), MakeHost(options, context, end));
+  context.console.ThrowIfInterrupted();
   context.EmitJson(ReportJson(report).dump(1, ' ', false, Json::error_handler_t::replace));
   return kDone;
 }
@@ -410,7 +417,8 @@ void AddViewCommand(CLI::App& app) {
         AddWindowRendererOptions(command, options->renderer);
         AddMeasuredOnly(command, options->measured_only);
         AddMemoryOption(command, options->memory_gb,
-                        "Memory for the views' pixels; others are dropped and read again [4]");
+                        "Memory for the image and the views' pixels; views beyond it are dropped "
+                        "and read again [4]");
         options->render = AddRenderOptions(command, WholeFrames());
         return [options, &command](const Context& context) {
           UseStoredOptions(command, io::ReadSet(options->set), *options->render);

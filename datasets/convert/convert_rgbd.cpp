@@ -18,7 +18,7 @@ constexpr double kMillimetre = 0.001;
 
 // Red, green, blue and alpha as stored, not multiplied.
 Grid<std::uint8_t> ReadRgba(const fs::path& file) {
-  const auto in = io::OpenImage(file, io::kImageLimitPx);
+  const auto in = io::OpenImage(file);
   if (in->spec().nchannels != 4 || in->spec().format != OIIO::TypeDesc::UINT8) {
     throw Error(file.string() + ": expected 8-bit RGBA, found another kind of image");
   }

@@ -42,6 +42,14 @@ size_t PeakMemoryBytesWithPrograms() {
   return std::max(PeakMemoryBytes(), PeakMemoryBytesOf(RUSAGE_CHILDREN));
 }
 
+double MachineMemoryBytes() {
+  const double machine = static_cast<double>(sysconf(_SC_PHYS_PAGES)) *
+                         static_cast<double>(sysconf(_SC_PAGESIZE));
+  rlimit limit{};
+  if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return machine;
+  return std::min(machine, static_cast<double>(limit.rlim_cur));
+}
+
 size_t MemoryBytes() {
   std::ifstream in("/proc/self/statm");  // pages: virtual, physical, ...
   size_t all = 0, physical = 0;

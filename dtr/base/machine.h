@@ -19,4 +19,7 @@ size_t PeakMemoryBytesWithPrograms();
 /// What this process has just now; 0 where the system does not say.
 size_t MemoryBytes();
 
+/// Memory that this process may have: the machine's, or less where a limit is set (ulimit -v).
+double MachineMemoryBytes();
+
 }  // namespace dtr

@@ -214,7 +214,7 @@ void WriteFloats(const fs::path& file, const Grid<float>& grid,
 }  // namespace
 
 Grid<float> ReadFloatGrid(const fs::path& file, std::uint64_t limit_px) {
-  return ReadFloatsOf(*OpenImage(file, limit_px), file);
+  return ReadFloatsOf(*OpenImage(file, {limit_px}), file);
 }
 
 void WriteExr(const fs::path& file, const Grid<float>& grid, bool half) {
@@ -240,7 +240,7 @@ void WriteExrOfVectors(const fs::path& file, const Grid<float>& grid) {
 }
 
 Grid<std::uint16_t> ReadPng16(const fs::path& file, std::uint64_t limit_px) {
-  return ReadCodesOf(*OpenImage(file, limit_px), file);
+  return ReadCodesOf(*OpenImage(file, {limit_px}), file);
 }
 
 void WritePng16(const fs::path& file, const Grid<std::uint16_t>& grid) {
@@ -281,7 +281,7 @@ DepthImage ReadDepth(const fs::path& file, const DepthFormat& format, int width_
     return Naming(
         file, [&] { return DecodeInverseDepth(codes, format.near_z, format.far_z, format.steps); });
   }
-  const auto in = OpenImage(file, kImageLimitPx);
+  const auto in = OpenImage(file);
   ExpectSize(*in, file, width_px, height_px);
   return Naming(file, [&] {
     DepthImage depth;
@@ -321,7 +321,7 @@ Grid<float> ReadSigma(const fs::path& file, int width_px, int height_px,
                      return std::bit_cast<float>(static_cast<std::uint32_t>(code) << kSigmaBits);
                    });
   } else {
-    const auto in = OpenImage(file, kImageLimitPx);
+    const auto in = OpenImage(file);
     ExpectSize(*in, file, width_px, height_px);
     sigma = ReadFloatsOf(*in, file);
   }
@@ -337,7 +337,7 @@ Grid<std::uint16_t> ReadDepthCodes(const fs::path& file, const DepthFormat& form
   if (format.coding != DepthCoding::kPng16InverseDepth) {
     throw std::invalid_argument("ReadDepthCodes: expected a coding of inverse depth in steps");
   }
-  const auto in = OpenImage(file, kImageLimitPx);
+  const auto in = OpenImage(file);
   ExpectSize(*in, file, width_px, height_px);
   return ReadCodesOf(*in, file);
 }

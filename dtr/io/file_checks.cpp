@@ -17,9 +17,8 @@ namespace {
 
 namespace fs = std::filesystem;
 constexpr size_t kPngSignatureBytes = 8;
-// Deflate packs at most 1032 bytes into one (zlib's manual); of one bit a pixel those are 8256
-// pixels. Images that small in memory need no such check.
-constexpr std::uint64_t kMaxPxPerByte = 8256, kAlwaysPlausiblePx = 4 << 20;
+// Images of so few pixels are small in memory whatever their files hold.
+constexpr std::uint64_t kAlwaysPlausiblePx = 4 << 20;
 
 bool StartsAsPng(std::ifstream& in) {
   std::array<char, kPngSignatureBytes> start{};
@@ -69,6 +68,31 @@ bool IsImageStart(const std::string& start) {
   if (start.size() < 12) return false;
   return holds(4, "ftyp") || (holds(0, "RIFF") && holds(8, "WEBP")) ||
          holds(0, std::string("\0\0\0\x0cjP  ", 8));
+}
+
+// Bits of a PNG's pixel, from its header (PNG specification, section 11.2.2).
+std::uint64_t PngBits(const fs::path& file) {
+  std::ifstream in = StreamOf(file);
+  std::array<char, 26> head{};
+  if (!in.read(head.data(), head.size())) return 1;
+  constexpr std::array<std::uint64_t, 7> kChannels{1, 1, 3, 1, 2, 1, 4};  // by colour type
+  const auto type = static_cast<unsigned char>(head[25]);
+  const auto depth = static_cast<unsigned char>(head[24]);
+  return std::max(1, depth * static_cast<int>(type < kChannels.size() ? kChannels[type] : 1));
+}
+
+// The most pixels that a byte of a file can stand for. `format`: as OpenImageIO calls it.
+std::uint64_t MaxPxPerByte(const fs::path& file, const std::string& format) {
+  // Deflate packs at most 1032 bytes into one (zlib's manual): of one bit a pixel 8256 pixels.
+  constexpr std::uint64_t kBits = 8, kDeflate = 1032;
+  if (format == "png") return std::max<std::uint64_t>(1, kDeflate * kBits / PngBits(file));
+  // A block of 8x8 pixels takes a bit of its brightness at least.
+  if (format == "jpeg") return 64 * kBits;
+  if (format == "hdr") return 16;  // runs of at most 127 of each of four channels, in two bytes
+  if (format == "pnm") return kBits;    // not packed
+  // Runs of at most 128 bytes, in two of them; sensors' numbers pack less.
+  if (format == "targa" || format == "psd" || format == "dpx" || format == "raw") return 64 * kBits;
+  return kDeflate * kBits;
 }
 
 // For a message: what is not printable as a full stop.
@@ -125,11 +149,11 @@ void ExpectWholeFile(const fs::path& file) {
   ExpectPlausibleExr(file);
 }
 
-void ExpectPlausibleSize(const fs::path& file, int width_px, int height_px) {
-  const std::uint64_t found_px =
-      static_cast<std::uint64_t>(width_px) * static_cast<std::uint64_t>(height_px);
+void ExpectPlausibleSize(const fs::path& file, std::uint64_t width_px, std::uint64_t height_px,
+                         const std::string& format) {
+  if (height_px == 0 || width_px <= kAlwaysPlausiblePx / height_px) return;
   const std::uint64_t bytes = fs::file_size(file);
-  if (found_px <= kAlwaysPlausiblePx || found_px / kMaxPxPerByte <= bytes) return;
+  if (width_px <= bytes * MaxPxPerByte(file, format) / height_px) return;
   throw Error(file.string() + ": damaged image: expected as many pixels as " +
               std::to_string(bytes) + " bytes can hold, found " + std::to_string(width_px) + "x" +
               std::to_string(height_px) + "; copy the file again");

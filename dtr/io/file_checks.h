@@ -3,6 +3,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <string>
 
 namespace dtr::io {
 
@@ -16,7 +17,9 @@ void ExpectImageKind(const std::filesystem::path& file);
 void ExpectWholeFile(const std::filesystem::path& file);
 
 /// Throws Error for an image so large that a file of this size cannot hold it: header fields that
-/// were made up, before anybody allocates for them.
-void ExpectPlausibleSize(const std::filesystem::path& file, int width_px, int height_px);
+/// were made up, before anybody allocates for them. `format`: OpenImageIO's name; others than those
+/// whose packing is known may pack as deflate does.
+void ExpectPlausibleSize(const std::filesystem::path& file, std::uint64_t width_px,
+                         std::uint64_t height_px, const std::string& format);
 
 }  // namespace dtr::io

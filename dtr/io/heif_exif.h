@@ -10,7 +10,4 @@ namespace dtr::io {
 /// where it lies elsewhere than in the file or in `idat`, or where a number of the file is broken.
 std::string ReadHeifExif(const std::filesystem::path& file);
 
-/// Whether a file begins as HEIF or AVIF does.
-bool IsHeif(const std::filesystem::path& file);
-
 }  // namespace dtr::io

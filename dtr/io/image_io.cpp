@@ -15,9 +15,11 @@
 #include "dtr/io/colour_coding.h"
 #include "dtr/io/file_colours.h"
 #include "dtr/io/heif_exif.h"
+#include "dtr/io/heif_items.h"
 #include "dtr/io/jpeg_cmyk.h"
 #include "dtr/io/oiio_files.h"
 #include "dtr/io/photo_colours.h"
+#include "dtr/io/whole_images.h"
 
 namespace dtr::io {
 namespace {
@@ -97,10 +99,10 @@ int ExifOrientationOf(const ImageSpec& spec) {
 int ColourChannels(const ImageSpec& spec) { return spec.nchannels >= 3 ? 3 : 1; }
 
 // Pixels as 8-bit sRGB with the file's number of colour channels, without what alpha hides.
-Grid<std::uint8_t> ReadColours(OIIO::ImageInput& in, const fs::path& file, const Alpha& alpha) {
+Grid<std::uint8_t> ReadColours(OIIO::ImageInput& in, const fs::path& file,
+                               const PhotoColours& colours, const Alpha& alpha) {
   const ImageSpec& spec = in.spec();
   const int channels = ColourChannels(spec);
-  const PhotoColours colours(spec, in.format_name(), file);
   Grid<std::uint8_t> pixels(spec.width, spec.height, channels);
   if (spec.format.basetype == TypeDesc::UINT8 && !colours.converts()) {
     ReadPixels(in, file, 0, channels, TypeDesc::UINT8, pixels.data().data());
@@ -182,10 +184,31 @@ void AddRemarks(OIIO::ImageInput& in, ImageHeader& header) {
   (void)in.geterror();
 }
 
+// At the peak of ReadImageAndMask, in its three parts: reading, masking, rotating.
+double ReadBytesOf(const OIIO::ImageInput& in, const fs::path& file, bool converts) {
+  const ImageSpec& spec = in.spec();
+  const bool has_alpha = AlphaChannelOf(spec) >= 0;
+  const double colours = ColourChannels(spec), alpha = has_alpha ? sizeof(float) : 0;
+  const bool as_floats = converts || spec.format.basetype != TypeDesc::UINT8;
+  constexpr double kRgb = 3, kMask = 1;
+  constexpr double kCoarser = (3 * sizeof(float) + 1) / 3.0;  // FillUnusable: all halvings
+  const double reading = colours * (as_floats ? 1 + sizeof(float) : 1) + alpha;
+  const double masking = kRgb + (colours < kRgb ? colours : 0) +
+                         (has_alpha ? alpha + kMask + kCoarser : 0);
+  const double rotating = 2 * kRgb + (has_alpha ? alpha + 2 * kMask : 0);
+  const double bytes_per_px = std::max({reading, masking, rotating});
+  return DecoderBytes(in, file) + bytes_per_px * spec.width * spec.height;
+}
+
 }  // namespace
 
-ImageHeader ReadImageHeader(const fs::path& file) {
-  const auto in = OpenImage(file, UINT64_MAX);
+double BytesToReadHeader(const fs::path& file) {
+  const auto whole = LookAtWholeImage(file);
+  return whole ? whole->bytes() : 0;
+}
+
+ImageHeader ReadImageHeader(const fs::path& file, double memory_gb) {
+  const auto in = OpenImage(file, {UINT64_MAX, memory_gb});
   const ImageSpec spec = SpecOf(*in, file);
   ImageHeader header;
   header.width_px = spec.width;
@@ -210,6 +233,7 @@ ImageHeader ReadImageHeader(const fs::path& file) {
   header.raw_balance = RawBalanceOf(spec);
   const PhotoColours colours(spec, in->format_name(), file);
   header.converted = colours.converts();
+  header.read_bytes = ReadBytesOf(*in, file, colours.converts());
   header.remarks = colours.remarks();
   AddRemarks(*in, header);
   return header;
@@ -220,11 +244,13 @@ ImageRgb8 ReadImage(const fs::path& file, const ImageReadOptions& options) {
 }
 
 ImageAndMask ReadImageAndMask(const fs::path& file, const ImageReadOptions& options) {
-  const auto in = OpenImage(file, options.limit_px, options.raw_balance);
+  const auto in = OpenImage(file, {options.limit_px, options.memory_gb}, options.raw_balance);
+  const PhotoColours colours(in->spec(), in->format_name(), file);
+  ExpectMemory(*in, file, ReadBytesOf(*in, file, colours.converts()), options.memory_gb);
   std::optional<Grid<std::uint8_t>> plain;
   if (IsCmyk(in->spec())) plain = ReadPlainCmykJpeg(file);
   const Alpha alpha(*in, file);
-  Grid<std::uint8_t> pixels = plain ? std::move(*plain) : ReadColours(*in, file, alpha);
+  Grid<std::uint8_t> pixels = plain ? std::move(*plain) : ReadColours(*in, file, colours, alpha);
   if (pixels.channels() == 1) pixels = RgbFromGrey(pixels);
   Mask mask = alpha.Usable();
   FillUnusable(pixels, mask);
@@ -237,7 +263,8 @@ ImageAndMask ReadImageAndMask(const fs::path& file, const ImageReadOptions& opti
 }
 
 Mask ReadMask(const fs::path& file, std::uint64_t limit_px) {
-  const auto in = OpenImage(file, limit_px);
+  const auto in = OpenImage(file, {limit_px});
+  ExpectMemory(*in, file, ReadBytesOf(*in, file, false), kImageMemoryGb);
   Mask mask(in->spec().width, in->spec().height);
   ReadPixels(*in, file, 0, 1, TypeDesc::UINT8, mask.data().data());
   for (std::uint8_t& value : mask.data()) value = value >= 128 ? 255 : 0;

@@ -44,14 +44,22 @@ struct ImageHeader {
   /// Of raw files: what the camera chose for this photo.
   std::optional<RawBalance> raw_balance;
   bool converted = false;  ///< integer samples that are not sRGB's: ReadImage converts them
+  double read_bytes = 0;   ///< memory that ReadImageAndMask takes at its peak, its result included
   /// One line for each thing that the file holds or states and that ReadImage does not use.
   std::vector<std::string> remarks;
 };
 
-/// Reads a file's header. Throws Error when the file is no image OpenImageIO knows, and where
-/// ReadImage could not convert its colours.
+/// What reading an image may take where nothing else is said, 1e9 bytes.
+inline constexpr double kImageMemoryGb = 4;
+
+/// Reads a file's header. Throws Error when the file is no image OpenImageIO knows, where ReadImage
+/// could not convert its colours, and before anything is allocated for an image that its decoder
+/// would unpack beyond `memory_gb` (0: no bound) only to tell its header.
 /// EXIF values that make no sense (zero, negative, NaN) are left out, as cameras write zeros there.
-ImageHeader ReadImageHeader(const std::filesystem::path& file);
+ImageHeader ReadImageHeader(const std::filesystem::path& file, double memory_gb = kImageMemoryGb);
+
+/// What ReadImageHeader takes: 0 but for formats whose decoders unpack the whole image.
+double BytesToReadHeader(const std::filesystem::path& file);
 
 /// Whether a file begins as PNG, JPEG, TIFF, OpenEXR, WebP, HEIF or AVIF, whatever it is called.
 bool HoldsPhoto(const std::filesystem::path& file);
@@ -64,6 +72,8 @@ struct ImageReadOptions {
   /// Of raw files: in place of what the camera chose for each photo; of others nothing.
   std::optional<RawBalance> raw_balance = {};
   std::uint64_t limit_px = kImageLimitPx;  ///< larger images are rejected before allocation
+  /// So are those that reading would take more for, 1e9 bytes; 0: whoever calls has seen to that.
+  double memory_gb = kImageMemoryGb;
 };
 
 /// Reads an image as 8-bit sRGB of 3 channels.
@@ -77,7 +87,7 @@ struct ImageReadOptions {
 /// rounded to 8 bits.
 /// Raw files are developed by LibRaw without automatic brightness.
 /// NaN and infinity among them are rejected. Only the first image of a file is read.
-/// Throws Error when the file is no image, is damaged or cut short, or is larger than the limit.
+/// Throws Error when the file is no image, is damaged or cut short, or is larger than the limits.
 ImageRgb8 ReadImage(const std::filesystem::path& file, const ImageReadOptions& options = {});
 
 /// How many pixels of an image its alpha does not leave opaque.

@@ -64,6 +64,7 @@ Json ParseJson(const std::string& text, const std::string& where) {
     }
     return true;
   };
+  if (text.empty()) throw Error(where + ": expected JSON, found an empty file; copy it again");
   try {
     return Json::parse(text, check);
   } catch (const Json::parse_error& error) {

@@ -35,11 +35,14 @@ struct LoadOptions {
       false;  ///< false: held-out views are left out altogether, so no renderer sees one
   bool collapse_duplicates = true;  ///< views of equal camera and content count once
   int threads = 0;                  ///< 0: all cores
+  /// A view that alone takes more, 1e9 bytes, is an error before it is allocated; 0: no bound.
+  double memory_gb = kImageMemoryGb;
   /// Told of what is left out of a view that loads all the same; called from any thread.
   std::function<void(const std::string&)> warn = [](const std::string&) {};
 };
 
-/// ReadSet, then the pixels of its views. Throws Error; never gives half a set.
+/// ReadSet, then the pixels of its views. Throws Error, also where they would take more memory than
+/// the machine has; never gives half a set.
 DtrSet LoadSet(const std::filesystem::path& set_folder, const LoadOptions& options = {});
 
 /// Loads the pixels that `options` ask for into a view of ReadSet; `held_out` and

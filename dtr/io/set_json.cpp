@@ -1,5 +1,7 @@
 #include "dtr/io/set_json.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -10,6 +12,7 @@
 #include "dtr/io/held_out_files.h"
 #include "dtr/io/json_fields.h"
 #include "dtr/io/video_frames.h"
+#include "dtr/types/computable.h"
 
 namespace dtr::io {
 namespace {
@@ -113,7 +116,11 @@ Pose PoseFrom(const JsonObject& object) {
   if (!(std::abs(wxyz.norm() - 1) <= kUnitQuaternion)) {
     object.Fail("rotation_wxyz", "a quaternion of length 1", "length " + Json(wxyz.norm()).dump());
   }
-  return {Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]), object.Numbers("translation", 3)};
+  const Eigen::Vector3d translation = object.Numbers("translation", 3);
+  if (!(translation.cwiseAbs().maxCoeff() <= kMaxLength)) {
+    object.Fail("translation", fmt::format("3 numbers within {:g} of 0", kMaxLength));
+  }
+  return {Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]), translation};
 }
 
 Json ToJson(const Pose& pose) {

@@ -6,7 +6,10 @@
 #include "dtr/base/files.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/lower_case.h"
+#include "dtr/base/machine.h"
+#include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/base/size_text.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/held_out_files.h"
 #include "dtr/io/mesh_io.h"
@@ -40,6 +43,45 @@ DtrSet ReadSetFile(const fs::path& set_folder) {
     MergeHeldOutFiles(ReadFile(list, kSetFileLimitBytes), list.string(), set);
   }
   return set;
+}
+
+struct ViewPixels {
+  double image = 0, depth = 0;
+};
+
+ViewPixels PixelsOf(const View& view, const LoadOptions& options) {
+  const double pixels = static_cast<double>(view.camera.width_px()) * view.camera.height_px();
+  ViewPixels found;
+  if (options.images && view.image_file) found.image = pixels;
+  if (options.depth && view.depth_file) found.depth = pixels / view.depth_scale / view.depth_scale;
+  return found;
+}
+
+/// While it is read: 8-bit colours, their decoder's, and the mask, or the frames that a frame of a
+/// video refers to; depth as codes, as floats, and the completed ones.
+double PeakBytesOf(const View& view, const LoadOptions& options) {
+  const ViewPixels pixels = PixelsOf(view, options);
+  constexpr double kImage = 8, kFrame = 40, kDepth = 16;
+  return (view.image_frame ? kFrame : kImage) * pixels.image + kDepth * pixels.depth;
+}
+
+/// Once it is read.
+double HeldBytesOf(const View& view, const LoadOptions& options) {
+  const ViewPixels pixels = PixelsOf(view, options);
+  const double image = view.mask_file ? 4 : 3;
+  const double depth = options.sigma && view.sigma_file ? 2 * sizeof(float) : sizeof(float);
+  return image * pixels.image + depth * pixels.depth;
+}
+
+void RequireMemoryForAll(const fs::path& set_folder, const std::vector<View*>& views,
+                         const LoadOptions& options) {
+  double bytes = 0;
+  for (const View* view : views) bytes += HeldBytesOf(*view, options);
+  const double most = MachineMemoryBytes();
+  if (bytes <= std::max(most, kAlwaysAllowedBytes)) return;
+  throw Error(set_folder.string() + ": its " + std::to_string(views.size()) + " views take " +
+              GigabytesText(bytes) + " GB of memory, more than the " + GigabytesText(most) +
+              " GB that there are; use a machine with more, or a set of fewer or smaller views");
 }
 
 void ExpectViewSize(const fs::path& file, const View& view, int width_px, int height_px) {
@@ -140,20 +182,24 @@ DtrSet ReadSet(const fs::path& set_folder) {
 }
 
 void LoadPixels(const fs::path& set_folder, View& view, const LoadOptions& options) {
+  RequireMemory(PeakBytesOf(view, options), options.memory_gb,
+                (set_folder / kSetFile).string() + ": " + view.name + ": reading " +
+                    SizeText(view.camera.width_px(), view.camera.height_px()) + " pixels",
+                "give more");
   if (options.images && view.image_file) {
     const fs::path file = set_folder / view.image_file->path;
     if (view.image_frame) {
       view.image = ReadVideoFrame(file, *view.image_file, *view.image_frame, view.camera.width_px(),
                                   view.camera.height_px());
     } else {
-      const ImageHeader header = ReadImageHeader(file);
+      const ImageHeader header = ReadImageHeader(file, options.memory_gb);
       ExpectViewSize(file, view, header.width_px, header.height_px);
-      view.image = ReadImage(file);
+      view.image = ReadImage(file, {.memory_gb = options.memory_gb});
     }
   }
   if (options.images && view.mask_file) {
     const fs::path file = set_folder / view.mask_file->path;
-    const ImageHeader header = ReadImageHeader(file);
+    const ImageHeader header = ReadImageHeader(file, options.memory_gb);
     ExpectViewSize(file, view, header.width_px, header.height_px);
     view.mask = ReadMask(file);
   }
@@ -190,6 +236,7 @@ DtrSet LoadSet(const fs::path& set_folder, const LoadOptions& options) {
     }
     for (View& view : frame.views) views.push_back(&view);
   }
+  RequireMemoryForAll(set_folder, views, options);
   ParallelFor(0, static_cast<int>(views.size()), options.threads,
               [&](int i) { LoadPixels(set_folder, *views[static_cast<size_t>(i)], options); });
   return set;

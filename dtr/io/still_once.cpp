@@ -143,7 +143,7 @@ StoredFile Written(const fs::path& set_folder, const std::string& path, const st
 }
 
 /// Bytes of files, equal ones counted once, as sets store them once.
-class FileBytes {
+class DistinctBytes {
  public:
   void Add(const StoredFile& file) {
     if (counted_.insert(file.sha256).second) sum_ += file.bytes;
@@ -174,7 +174,7 @@ void StoreOnce(const fs::path& set_folder, const CameraOverTime& camera) {
   const StoredFile base =
       Written(set_folder, "still/" + folder + "/" + camera.views.front()->id + ".dtz",
               EncodeBands(*common));
-  FileBytes before, after;
+  DistinctBytes before, after;
   after.Add(base);
   std::vector<StoredFile> files;
   for (const View* view : camera.views) {

@@ -6,7 +6,7 @@
 namespace dtr::io {
 
 Grid<std::uint8_t> ReadStoredBytes(const std::filesystem::path& file, std::uint64_t limit_px) {
-  const auto in = OpenImage(file, limit_px);
+  const auto in = OpenImage(file, {limit_px});
   const OIIO::ImageSpec& spec = in->spec();
   if (spec.format.basetype != OIIO::TypeDesc::UINT8) {
     throw Error(file.string() + ": expected an image of 8 bits, found one of " +

@@ -101,7 +101,11 @@ const std::vector<Field>& Fields() {
       Number("falloff", &O::falloff),
       Whole("blend_k", &O::blend_k, 64),
       {"max_angle_deg", [](const O& o) { return Json(DegreesOf(o.max_angle_rad)); },
-       [](O& o, const Json& value) { o.max_angle_rad = RadiansOf(NumberIn(value)); }},
+       [](O& o, const Json& value) {
+         const double degrees = NumberIn(value);
+         if (!(degrees > 0 && degrees <= 180)) throw Unfit{"more than 0 and at most 180"};
+         o.max_angle_rad = RadiansOf(degrees);
+       }},
       Number("delta_px", &O::delta_px),
       Number("depth_break_px", &O::depth_break_px),
       Number("mesh_tolerance_px", &O::mesh_tolerance_px),

@@ -51,6 +51,7 @@ class Renderer::Implementation {
   RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
                       const Pose& novel_from_world, const RenderOptions& options) {
     drawn_.reset();
+    CheckNovelCamera(novel, novel_from_world);  // before anything of its size
     RenderResult result = EmptyResult(novel);
     PreparedFrame prepared = Prepare(scene, novel, novel_from_world, options);
     result.views_used = std::move(prepared.views_used);

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <thread>
 
+#include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
 
 namespace dtr {
@@ -46,6 +47,20 @@ TEST(MemoryBudget, SharesOfManySizesAllComeThrough) {
     ++done;
   });
   EXPECT_EQ(done, 200);
+}
+
+TEST(RequireMemory, RejectsWhatIsLargerThanAllOfItWithNeedAndLimit) {
+  const auto ask = [](double bytes, double gb) { RequireMemory(bytes, gb, "a.gif", "shrink it"); };
+  try {
+    ask(3.2e9, 0.5);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(), "a.gif takes 3.2 GB of memory, more than `memory` 0.5; shrink it");
+  }
+  EXPECT_NO_THROW(ask(0.5e9, 0.5));
+  EXPECT_NO_THROW(ask(1e15, 0));                    // no bound
+  EXPECT_NO_THROW(ask(kAlwaysAllowedBytes, 1e-6));  // the program itself takes as much
+  EXPECT_THROW(ask(kAlwaysAllowedBytes + 1, 1e-6), Error);
 }
 
 }  // namespace

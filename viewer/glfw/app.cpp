@@ -23,6 +23,7 @@
 #include "viewer/glfw/run_figures.h"
 #include "viewer/glfw/session.h"
 #include "viewer/glfw/user_interface.h"
+#include "viewer/glfw/writing.h"
 #include "viewer/time_player.h"
 
 namespace dtr::viewer {
@@ -59,7 +60,7 @@ class App {
 
   AppReport Run() {
     Stopwatch since_last;
-    while (!window_.CloseRequested() && !quit_) {
+    while (!window_.CloseRequested() && !quit_ && !StopRequested()) {
       const Stopwatch frame;
       const double cpu_ms = ProcessCpuMilliseconds();
       const double passed = since_last.seconds();
@@ -80,6 +81,7 @@ class App {
       if (drew_moving) CountMoving(1e3 * frame.seconds(), ProcessCpuMilliseconds() - cpu_ms);
       FinishFrame();
     }
+    if (StopRequested() && paths_.recording()) paths_.Abort("interrupted");
     AppReport report = figures_.report();
     report.last = State();
     report.view_bytes = session_->opened().stream->decoded_bytes();
@@ -89,6 +91,8 @@ class App {
 
  private:
   Controller& controller() { return session_->controller; }
+
+  bool StopRequested() const { return host_.stop_requested && host_.stop_requested(); }
 
   void Tell(const std::string& line) {
     message_ = line;
@@ -363,6 +367,7 @@ class App {
   void KeepWhatWasAskedFor() {
     const bool last_frame = ReachedFrames();
     if (!whole()) return;
+    const Writing writing(host_);
     try {
       if (std::exchange(copy_command_, false)) CopyCommand();
       if (std::exchange(save_picture_, false)) {
@@ -422,7 +427,10 @@ class App {
     figures_.EndFrame(any, whole());
     // Told once what came of the last input shows: keys pressed at once are then taken again, of
     // which a dialog that has just closed would keep those that come before ImGui's next frame.
-    if (whole() && settling_ <= 0 && host_.state_changed) host_.state_changed(State());
+    if (whole() && settling_ <= 0 && host_.state_changed) {
+      const Writing writing(host_);
+      host_.state_changed(State());
+    }
     if (quit_ || settling_ > 0 || CameraMoves() || !session_->schedule.MadeFor(Order())) return;
     if (!time_.playing()) moving_fps_ = 0;
     // A still image is due soon, or when its views have been read; a video is nearly there; so

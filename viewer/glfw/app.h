@@ -127,6 +127,12 @@ struct Host {
   std::function<std::map<std::string, ViewValidation>()> validations;
   /// A line for whoever started the program.
   std::function<void(const std::string&)> say;
+  /// True once the window is to close at once, as its user would close it: a signal asks for that.
+  /// Null: never.
+  std::function<bool()> stop_requested;
+  /// Told before a file is begun that must not be left half-written, and once it is whole or gone;
+  /// null: nobody asks.
+  std::function<void(bool)> writing;
   /// Told whenever the window has a whole image and shows what the last input did; null: nobody
   /// asks.
   std::function<void(const AppState&)> state_changed;
@@ -154,7 +160,8 @@ struct AppReport {
   size_t view_bytes_held = 0;  ///< those of them that are in memory: the renderer may have its own
 };
 
-/// Shows the set until the window is closed. Throws dtr::Error where no window can be opened, the
+/// Shows the set until the window is closed, or the host asks for that: a video that is being
+/// recorded then leaves nothing behind. Throws dtr::Error where no window can be opened, the
 /// display has no OpenGL 4.3 or the set cannot be opened at the start; later errors are shown in
 /// the window. To be called on the program's first thread.
 AppReport RunViewer(const AppSettings& settings, const Host& host);

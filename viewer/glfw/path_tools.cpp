@@ -21,6 +21,7 @@ PathTools::~PathTools() {
 }
 
 void PathTools::AddKey(const NovelCamera& camera, const DtrSet& set) {
+  const Writing writing(host_);
   try {
     flight_.AddKey(camera);
     tell_("added to " + saver_.SavePath(flight_.keys(), set).string());
@@ -46,10 +47,12 @@ void PathTools::StartOrStopRecording(const PinholeCamera& like, const DtrSet& se
     if (frames.empty()) {
       return tell_("a video needs a path: K adds cameras to it, O loads one from a file");
     }
+    writing_.emplace(host_);
     const fs::path video = saver_.NameVideo(frames, set);
     flight_.Stop();
     recording_ = std::make_unique<Recording>(video, std::move(frames));
   } catch (const std::exception& error) {
+    writing_.reset();
     tell_(Said(error));
   }
 }
@@ -78,6 +81,7 @@ void PathTools::Tend() {
     if (!recording_->Done()) return;
     tell_(fmt::format("saved {} ({} frames)", recording_->target().string(), recording_->frames()));
     recording_.reset();
+    writing_.reset();
   } catch (const std::exception& error) {
     Abort(Said(error));
   }
@@ -88,6 +92,7 @@ fs::path PathTools::DropRecording() {
   recording_.reset();
   TryRemoveFile(target);  // its name was free when it was chosen; it may be finished by now
   TryRemoveFile(fs::path(target).replace_extension(".json"));
+  writing_.reset();
   return target;
 }
 

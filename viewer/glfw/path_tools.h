@@ -11,6 +11,7 @@
 #include "viewer/glfw/file_saver.h"
 #include "viewer/glfw/recording.h"
 #include "viewer/glfw/user_interface.h"
+#include "viewer/glfw/writing.h"
 
 namespace dtr::viewer {
 
@@ -53,6 +54,7 @@ class PathTools {
   FileSaver& saver_;
   const std::function<void(const std::string&)> tell_;
   Flight flight_;
+  std::optional<Writing> writing_;  ///< while there is a recording
   std::unique_ptr<Recording> recording_;
 };
 

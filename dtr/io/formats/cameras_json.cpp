@@ -1,7 +1,10 @@
 #include "dtr/io/formats/cameras_json.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 #include <stdexcept>
 
@@ -11,6 +14,7 @@
 #include "dtr/io/formats/json_fields.h"
 #include "dtr/io/formats/plausible_intrinsics.h"
 #include "dtr/io/formats/pose_from_matrix.h"
+#include "dtr/types/computable.h"
 
 namespace dtr::io {
 namespace {
@@ -153,6 +157,29 @@ void WriteCamerasJson(const std::filesystem::path& file, const CameraList& list)
   const std::string text = FormatCamerasJson(list);
   ParseCamerasJson(text, file.string());  // what we could not read back is not worth writing
   WriteFileAtomically(file, text);
+}
+
+void RequireComputable(const CameraList& list, const std::string& source) {
+  std::optional<Eigen::Vector3d> first;
+  double spread = 0;
+  for (const NamedCamera& named : list.cameras) {
+    const Eigen::Vector3d centre = named.cam_from_world.TargetOriginInSource();
+    const double away = std::max(centre.cwiseAbs().maxCoeff(),
+                                 named.cam_from_world.translation.cwiseAbs().maxCoeff());
+    if (!(away <= kMaxLength)) {
+      throw Error(fmt::format(
+          "{}: {}: its position, {:.3g} units from the origin, cannot be computed with; give "
+          "positions within {:g} units, in another unit or from another origin",
+          source, named.name, away, kMaxLength));
+    }
+    if (!first) first = centre;
+    spread = std::max(spread, (centre - *first).cwiseAbs().maxCoeff());
+  }
+  if (spread == 0 || spread >= kMinLength) return;
+  throw Error(fmt::format(
+      "{}: its cameras, within {:.3g} units of each other, cannot be computed with; give positions "
+      "that are {:g} units apart at least, in another unit",
+      source, spread, kMinLength));
 }
 
 CameraList RecentreWorld(CameraList list) {

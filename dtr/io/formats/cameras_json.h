@@ -74,6 +74,10 @@ void WriteCamerasJson(const std::filesystem::path& file, const CameraList& list)
 /// std::invalid_argument for cameras with distortion, which the file cannot hold.
 std::string FormatCamerasJson(const CameraList& list);
 
+/// Throws Error, naming `source` and a camera, where positions are beyond kMaxLength or all within
+/// kMinLength of each other, but not the same.
+void RequireComputable(const CameraList& list, const std::string& source);
+
 /// Keeps stored poses small. When the camera centres lie farther from 0 than 100 times their
 /// spread, world_origin moves by their centroid, rounded to multiples of a power of two near the
 /// spread (whole units at usual scales) so that sums stay exact in double; the cameras stay where

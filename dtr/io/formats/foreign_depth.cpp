@@ -143,11 +143,11 @@ DepthImage ReadForeignDepth(const std::filesystem::path& file, DepthKind kind, d
 }
 
 DepthImage ReadDepthOfAnySize(const std::filesystem::path& file, DepthKind kind, double unit_scale,
-                              int width_px, int height_px) {
+                              int width_px, int height_px, std::uint64_t limit_px) {
   constexpr std::uint64_t kMaxPerPixel = 16;  // four times finer than the photo per axis
   RequireUnit(file, unit_scale);
   const Grid<float> numbers =
-      ReadNumbers(file, std::min(kImageLimitPx, kMaxPerPixel * PixelsOf(width_px, height_px)),
+      ReadNumbers(file, std::min(limit_px, kMaxPerPixel * PixelsOf(width_px, height_px)),
                   width_px, height_px);
   return Scaled(file, numbers, kind, unit_scale);
 }

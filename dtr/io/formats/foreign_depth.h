@@ -1,7 +1,9 @@
 // dtr/io/formats/foreign_depth.h -- depth maps made by other programs.
 #pragma once
+#include <cstdint>
 #include <filesystem>
 
+#include "dtr/io/image_io.h"
 #include "dtr/types/depth_image.h"
 
 namespace dtr::io {
@@ -21,9 +23,9 @@ namespace dtr::io {
 DepthImage ReadForeignDepth(const std::filesystem::path& file, DepthKind kind, double unit_scale,
                             int width_px, int height_px);
 
-/// The same for a map of any size up to 16 times the photo's pixels.
+/// The same for a map of any size up to 16 times the photo's pixels, and up to the limit.
 DepthImage ReadDepthOfAnySize(const std::filesystem::path& file, DepthKind kind, double unit_scale,
-                              int width_px, int height_px);
+                              int width_px, int height_px, std::uint64_t limit_px = kImageLimitPx);
 
 /// Whether a depth map holds integers, whose unit is never a scene unit by itself: a PNG, or a TIFF
 /// or .npy of such a type. Throws Error where that must be read from the file and cannot.

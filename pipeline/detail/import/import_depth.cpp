@@ -6,10 +6,12 @@
 #include <vector>
 
 #include "dtr/base/error.h"
+#include "dtr/base/memory_budget.h"
 #include "dtr/base/size_text.h"
 #include "dtr/io/formats/depth_grid.h"
 #include "dtr/io/formats/foreign_confidence.h"
 #include "dtr/io/formats/foreign_depth.h"
+#include "dtr/types/computable.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -33,19 +35,32 @@ DepthImage ToPlaneZOfDistorted(DepthImage depth, const io::NamedCamera& named,
   return z;
 }
 
-// Depth is completed up to 50 times the farthest, and squared in places; floats hold 3.4e38.
-constexpr float kMaxForeignDepth = 1e30f;
+// Sky that a program wrote as the largest number it knows, or a wrong unit.
+void RequireComputable(const fs::path& file, const DepthImage& depth) {
+  for (int y = 0; y < depth.height(); ++y) {
+    for (int x = 0; x < depth.width(); ++x) {
+      const double z = depth(x, y);
+      if (DepthImage::IsHole(depth(x, y)) || (z >= kMinLength && z <= kMaxLength)) continue;
+      throw Error(fmt::format(
+          "{}: its depth of {:.3g} units at pixel ({}, {}) cannot be computed with; give depths "
+          "from {:g} to {:g} units, and 0 where there is none",
+          file.string(), z, x, y, kMinLength, kMaxLength));
+    }
+  }
+}
+
+// What the numbers of a depth map take at their peak: as they come, as floats, and as plane z.
+constexpr double kBytesPerDepthPixel = 24;
+
+std::uint64_t LimitOf(const ImportOptions& options) {
+  constexpr double kAlways = 4 << 20;
+  if (options.memory_gb <= 0) return io::kImageLimitPx;
+  const double most = options.memory_gb * kBytesPerGigabyte / kBytesPerDepthPixel;
+  return static_cast<std::uint64_t>(
+      std::clamp(most, kAlways, static_cast<double>(io::kImageLimitPx)));
+}
 
 }  // namespace
-
-void RequireDepthInRange(const DepthImage& depth, const fs::path& file) {
-  const std::vector<float>& all = depth.grid().data();
-  const auto far = std::ranges::find_if(all, [](float z) { return z > kMaxForeignDepth; });
-  if (far == all.end()) return;
-  throw Error(fmt::format(
-      "{}: expected depths up to {:g}, found {:g}; give 0 (a hole) where nothing was measured",
-      file.string(), kMaxForeignDepth, *far));
-}
 
 std::vector<fs::path> DepthFilesOf(const io::NamedCamera& named, const ImportOptions& options) {
   std::vector<fs::path> found;
@@ -91,8 +106,9 @@ DepthImage ReadCameraDepth(const io::NamedCamera& named, const ImportOptions& op
   const PinholeCamera& camera = named.camera;
   const int width_px = camera.width_px(), height_px = camera.height_px();
   const DepthKind kind = options.depth_kind.value_or(named.depth_kind);
-  DepthImage depth =
-      io::ReadDepthOfAnySize(file, kind, options.depth_unit.value_or(1.0), width_px, height_px);
+  DepthImage depth = io::ReadDepthOfAnySize(file, kind, options.depth_unit.value_or(1.0), width_px,
+                                            height_px, LimitOf(options));
+  RequireComputable(file, depth);
   if (const fs::path confidence = options.confidence.FileOf(file); !confidence.empty()) {
     io::LeaveOutLowConfidence(confidence, depth);
   }

@@ -23,7 +23,4 @@ std::filesystem::path DepthFileOf(const io::NamedCamera& named, const ImportOpti
 DepthImage ReadCameraDepth(const io::NamedCamera& named, const ImportOptions& options,
                            const CameraDistortion* distortion, std::string& resampled);
 
-/// Throws Error, which names the file, where a depth is too large to be worked with.
-void RequireDepthInRange(const DepthImage& depth, const std::filesystem::path& file);
-
 }  // namespace dtr::pipeline

@@ -40,7 +40,7 @@ struct ViewNote {
 
 io::ImageAndMask ReadCameraImage(const io::NamedCamera& named, const fs::path& file,
                                  const ImportOptions& options, ViewNote& note) {
-  const io::ImageHeader header = io::ReadImageHeader(file);
+  const io::ImageHeader header = io::ReadImageHeader(file, options.memory_gb);
   const PinholeCamera& camera = named.camera;
   const StoredSize stored{header.width_px, header.height_px, header.exif_orientation};
   const auto grid = GridOfSize(camera.width_px(), camera.height_px(), stored, options.photo_grid);
@@ -52,12 +52,20 @@ io::ImageAndMask ReadCameraImage(const io::NamedCamera& named, const fs::path& f
   const bool upright = *grid == PhotoGrid::kUpright;
   note.as_stored = header.exif_orientation != 1 && !upright;
   note.turned = header.exif_orientation != 1 && upright;
-  return io::ReadImageAndMask(file, {.apply_exif_orientation = upright});
+  return io::ReadImageAndMask(file,
+                              {.apply_exif_orientation = upright, .memory_gb = options.memory_gb});
+}
+
+// Others of a few megapixels are read, to name their size.
+std::uint64_t LimitOf(const PinholeCamera& camera) {
+  constexpr std::uint64_t kAlways = 4 << 20;
+  return std::max(kAlways, static_cast<std::uint64_t>(camera.width_px()) *
+                               static_cast<std::uint64_t>(camera.height_px()));
 }
 
 Mask ReadCameraMask(const io::NamedCamera& named, const ImportOptions& options) {
   const fs::path file = MaskFolder(options) / named.mask_file;
-  const Mask mask = io::ReadMask(file);
+  const Mask mask = io::ReadMask(file, LimitOf(named.camera));
   if (mask.width() != named.camera.width_px() || mask.height() != named.camera.height_px()) {
     throw Error(file.string() + ": expected a mask of " +
                 SizeText(named.camera.width_px(), named.camera.height_px()) + " pixels, found " +
@@ -117,6 +125,17 @@ void RequireHeldOutNames(const io::CameraList& list, const ImportOptions& option
         std::any_of(list.cameras.begin(), list.cameras.end(),
                     [&](const io::NamedCamera& named) { return named.name == name; });
     if (!known) throw UsageError("held-out photo \"" + name + "\": no camera of the list has it");
+  }
+}
+
+// Before any file is hashed: the list says all sizes.
+void RequireMemoryForViews(const io::CameraList& list, double memory_gb) {
+  for (const io::NamedCamera& named : list.cameras) {
+    const double pixels = static_cast<double>(named.camera.width_px()) * named.camera.height_px();
+    RequireMemory(kBytesPerPhotoPixel * pixels, memory_gb,
+                  named.name + ": a view of " +
+                      SizeText(named.camera.width_px(), named.camera.height_px()) + " pixels",
+                  "give more, or shrink the photos and their cameras");
   }
 }
 
@@ -267,7 +286,6 @@ View ViewOf(const io::NamedCamera& named, const std::string& id, const ImportOpt
   if (note.alpha_masks) BlackenMasked(view);
   if (HasDepth(named, options)) {
     view.depth = ReadCameraDepth(named, options, distortion.get(), note.resampled);
-    RequireDepthInRange(view.depth, DepthFileOf(named, options));
     view.depth_scale = view.camera.width_px() / view.depth.width();
     RemoveMaskedDepth(view);
   }
@@ -395,6 +413,7 @@ io::AlphaTotals ImportSet(const io::CameraList& list, const ImportOptions& optio
                           const fs::path& target, bool force, const SparseScene* points,
                           Progress& progress) {
   RequireHeldOutNames(list, options);
+  RequireMemoryForViews(list, options.memory_gb);
   if (options.depth_dir.empty() && (points == nullptr || points->points.empty())) {
     throw UsageError(
         "import: expected depth maps (`depth`) or a model with points, found neither; without them "

@@ -49,8 +49,8 @@ struct ImportOptions {
   std::set<std::string> held_out;  ///< names of the list: camera and image are kept, depth is not
   DepthCoding depth_coding = DepthCoding::kPng16InverseDepth;
   int threads = 0;  ///< 0: all cores; the set does not depend on it
-  /// Views in memory at a time take at most so many 1e9 bytes (one alone may be larger); 0: no
-  /// bound.
+  /// Views in memory at a time take at most so many 1e9 bytes, and one that alone takes more is
+  /// rejected; 0: no bound.
   double memory_gb = 0;
   /// What tests and adjustment of the cameras gave, for the set's provenance; decides nothing.
   CalibrationReport calibration = {};

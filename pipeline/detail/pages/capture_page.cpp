@@ -63,8 +63,7 @@ CaptureLook LookAt(const capture::Capture& capture, const std::string& title, in
   ParallelFor(0, count, threads, [&](int i) {
     progress.ThrowIfInterrupted();
     const auto index = static_cast<size_t>(i);
-    const auto share =
-        memory.TakeForPhoto(capture.photos[index].width_px, capture.photos[index].height_px);
+    const auto share = memory.Take(MemoryOf(capture.photos[index]));
     thumbnails[index] = report::Shrink(WithMaskShown(capture.photos[index]), kThumbnailPx);
     progress.Update(++done);
   });

@@ -1,0 +1,99 @@
+#include "dtr/io/whole_images.h"
+
+#include <algorithm>
+#include <string>
+#include <string_view>
+
+#include "dtr/io/file_boxes.h"
+#include "dtr/io/heif_items.h"
+
+namespace dtr::io {
+namespace {
+
+// Measured with OpenImageIO 2.4 (docs/FUZZING.md); JPEG 2000: of each channel.
+constexpr double kGifBytes = 8, kWebpBytes = 16, kHeifBytes = 16, kJpeg2000Bytes = 7;
+
+std::uint64_t Little(std::string_view bytes, size_t at, size_t count) {
+  std::uint64_t value = 0;
+  for (size_t i = count; i-- > 0 && at + i < bytes.size();) {
+    value = value << 8 | static_cast<unsigned char>(bytes[at + i]);
+  }
+  return value;
+}
+
+std::optional<WholeImage> LookAtGif(FileBytes& file) {
+  const std::string head = file.At(0, 10);
+  if (!head.starts_with("GIF8")) return {};
+  return WholeImage{Little(head, 6, 2), Little(head, 8, 2), kGifBytes};
+}
+
+// The first chunk says it: VP8X the canvas, VP8L and VP8 the only image (RFC 9649, 2).
+std::optional<WholeImage> LookAtWebp(FileBytes& file) {
+  const std::string head = file.At(0, std::min<std::uint64_t>(30, file.size()));
+  if (head.size() < 25 || !head.starts_with("RIFF") || head.compare(8, 4, "WEBP") != 0) return {};
+  const std::string chunk = head.substr(12, 4);
+  if (chunk == "VP8X") {
+    return WholeImage{Little(head, 24, 3) + 1, Little(head, 27, 3) + 1, kWebpBytes};
+  }
+  constexpr std::uint64_t k14Bits = 0x3fff;
+  if (chunk == "VP8L") {
+    const std::uint64_t bits = Little(head, 21, 4);
+    return WholeImage{(bits & k14Bits) + 1, (bits >> 14 & k14Bits) + 1, kWebpBytes};
+  }
+  if (chunk != "VP8 ") return {};
+  return WholeImage{Little(head, 26, 2) & k14Bits, Little(head, 28, 2) & k14Bits, kWebpBytes};
+}
+
+// What an image of others' is drawn on (ISO 23008-12, 6.6.2): a grid, or an overlay.
+WholeImage CanvasOf(const HeifItem& item, const std::string& payload) {
+  const size_t bytes = (Big(payload, 1, 1) & 1) != 0 ? 4 : 2;
+  const size_t at = item.type == "grid" ? 4 : 10;  // after rows and columns, or the background
+  return {Big(payload, at, bytes), Big(payload, at + bytes, bytes), kHeifBytes};
+}
+
+std::optional<WholeImage> LookAtHeif(const std::filesystem::path& path) {
+  HeifItems heif(path);
+  std::optional<WholeImage> largest;
+  const auto take = [&largest](const WholeImage& image) {
+    if (!largest || image.bytes() > largest->bytes()) largest = image;
+  };
+  for (const std::string& extents : heif.Properties("ispe")) {
+    take({Big(extents, 0, 4), Big(extents, 4, 4), kHeifBytes});
+  }
+  for (const HeifItem& item : heif.items()) {
+    if (item.type == "grid" || item.type == "iovl") take(CanvasOf(item, heif.BytesOf(item)));
+  }
+  return largest;
+}
+
+// The SIZ marker follows the start of the codestream (ISO 15444-1, A.5.1).
+std::optional<WholeImage> LookAtCodestream(FileBytes& file, std::uint64_t at) {
+  const std::string head = file.At(at, 42);
+  if (!head.starts_with("\xff\x4f\xff\x51")) return {};
+  const auto side = [&](size_t end, size_t begin) {
+    return std::max(Big(head, end, 4), Big(head, begin, 4)) - Big(head, begin, 4);
+  };
+  return WholeImage{side(8, 16), side(12, 20),
+                    kJpeg2000Bytes * static_cast<double>(Big(head, 40, 2))};
+}
+
+std::optional<WholeImage> LookAtJpeg2000(FileBytes& file) {
+  if (const auto bare = LookAtCodestream(file, 0)) return bare;
+  if (file.At(4, 4) != "jP  ") return {};
+  const auto boxes = BoxesIn(file, 0, file.size());
+  const Box* codestream = FindBox(boxes, "jp2c");
+  return codestream == nullptr ? std::nullopt : LookAtCodestream(file, codestream->begin);
+}
+
+}  // namespace
+
+std::optional<WholeImage> LookAtWholeImage(const std::filesystem::path& path) {
+  if (IsHeif(path)) return LookAtHeif(path);
+  FileBytes file(path);
+  for (const auto look : {LookAtGif, LookAtWebp, LookAtJpeg2000}) {
+    if (const auto image = look(file)) return image;
+  }
+  return {};
+}
+
+}  // namespace dtr::io
