@@ -122,8 +122,8 @@ const ImageLook& Looks::LookOf(const std::string& name) {
   const auto [entry, is_new] = looks_.try_emplace(name);
   if (!is_new) return entry->second;
   try {
-    entry->second = LookAtPixels(io::ReadImage(
-        folder_ / name, {.apply_exif_orientation = true, .memory_gb = memory_gb_}));
+    entry->second = LookAtPixels(
+        io::ReadImage(folder_ / name, {.apply_exif_orientation = true, .memory_gb = memory_gb_}));
   } catch (const Error&) {
     // As above.
   }

@@ -129,7 +129,7 @@ void RejectInput(const Output& output, const fs::path& place, const std::vector<
 
 }  // namespace
 
-void RequireOutputs(const CLI::App& command, bool force) {
+void RequireOutputs(const CLI::App& command) {
   Paths paths;
   CollectPaths(command, paths);
   // The result for programs is the one that gives way.
@@ -152,14 +152,13 @@ void RequireOutputs(const CLI::App& command, bool force) {
                                    output.path.string(), other->second));
     }
     RejectPlaceInSet(output, place);
+    // Whoever writes several files into a folder says what is wrong with a file in its place.
+    if (output.option == "--images" || output.option == "--normals") continue;
     std::error_code ignored;
     const bool has_content =
         fs::is_regular_file(place, ignored) && fs::file_size(place, ignored) > 0;
     if (!has_content || output.is_set) continue;
     RejectInput(output, place, paths.inputs);
-    if (force) continue;
-    throw UsageError(fmt::format("{} {}: exists already; choose another name or give --force",
-                                 output.option, output.path.string()));
   }
 }
 

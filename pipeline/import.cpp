@@ -11,6 +11,7 @@
 #include "dtr/base/temporary_folder.h"
 #include "dtr/io/formats/rgbd_capture.h"
 #include "dtr/io/set_io.h"
+#include "dtr/types/computable.h"
 #include "pipeline/detail/cameras/given_cameras.h"
 #include "pipeline/detail/cameras/known_poses.h"
 #include "pipeline/detail/import/camera_distortion.h"
@@ -95,6 +96,13 @@ std::optional<double> DepthUnit(const ImportRequest& request, const CamerasFromF
                               *cameras.depth_unit, request.cameras.string()));
   }
   return request.depth_unit ? request.depth_unit : cameras.depth_unit;
+}
+
+void RequireComputable(const std::optional<double>& depth_unit) {
+  if (!depth_unit || (*depth_unit >= kMinLength && *depth_unit <= kMaxLength)) return;
+  throw UsageError(
+      fmt::format("`depth_unit` {:g}: expected {:g} to {:g}, with which can be computed",
+                  *depth_unit, kMinLength, kMaxLength));
 }
 
 // Poses act on p_world - origin afterwards, the points of the model with them.
@@ -194,6 +202,7 @@ ImportOptions OptionsFor(const ImportRequest& request, CamerasFromFile& cameras,
   options.mask_dir = FindMasks(request, cameras, progress);
   options.depth_kind = request.depth_kind;
   options.depth_unit = DepthUnit(request, cameras, progress);
+  RequireComputable(options.depth_unit);
   options.held_out = HeldOut(request, cameras, progress);
   options.photo_grid = cameras.list.photo_grid;
   options.distortion_of = DistortionOf;

@@ -114,10 +114,10 @@ void RequireMemoryForFrames(const RenderRequest& request, const std::vector<Nove
 }
 
 // What the largest frame leaves of the memory to views.
-double BytesForViews(const RenderRequest& request, const std::vector<NovelFrame>& frames) {
+double BytesLeftForViews(const RenderRequest& request, const std::vector<NovelFrame>& frames) {
   double bytes = request.memory_gb * kBytesPerGigabyte;
   for (const NovelFrame& frame : frames) {
-    bytes = std::min(bytes, dtr::BytesForViews(frame.camera, request.memory_gb));
+    bytes = std::min(bytes, BytesForViews(frame.camera, request.memory_gb));
   }
   return bytes;
 }
@@ -150,7 +150,7 @@ RenderReport Render(const RenderRequest& request,
   render.threads = request.threads;
   DynamicScene moving(request.set, described, request.exclude,
                       {request.memory_gb, render.threads, request.measured_only,
-                       BytesForViews(request, cameras)},
+                       BytesLeftForViews(request, cameras)},
                       progress);
   const auto shown = [&](size_t i) { return FrameShown(request, described, i, cameras.size()); };
   moving.At(shown(0));  // names are checked here

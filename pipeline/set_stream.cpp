@@ -30,8 +30,8 @@ std::unique_ptr<ViewStream> StreamOf(const std::filesystem::path& folder, DtrSet
                                      std::vector<RenderScene> described, const StreamLimits& limits,
                                      Progress& console) {
   ViewStream::Settings settings;
-  settings.host_bytes = static_cast<size_t>(
-      limits.view_bytes.value_or(limits.memory_gb * kBytesPerGigabyte));
+  settings.host_bytes =
+      static_cast<size_t>(limits.view_bytes.value_or(limits.memory_gb * kBytesPerGigabyte));
   settings.threads = limits.threads;
   settings.warn = [&console](const std::string& line) { console.Note(line); };
   io::LoadOptions load;

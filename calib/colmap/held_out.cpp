@@ -108,7 +108,7 @@ std::vector<size_t> PartnersOf(Workspace& workspace, const Frozen& frozen, Small
   std::vector<size_t> partners(frozen.sources.size());
   for (size_t i = 0; i < partners.size(); ++i) partners[i] = i;
   if (partners.size() > kExhaustiveLimit) {
-    const SmallFeatures own = SmallFeaturesOf(io::ReadImage(workspace.FileOf(0)));
+    const SmallFeatures own = SmallFeaturesOf(io::ReadImage(workspace.FileOf(0), {.memory_gb = 0}));
     partners = MostResembling(own, small.Features(workspace.progress()));
   }
   return partners;

@@ -126,7 +126,8 @@ GroupLenses LensesOf(const Workspace& workspace, const std::vector<CameraGroup>&
 
 sfm::Features FeaturesOf(const fs::path& photo, const fs::path& mask_file, int max_image_size_px,
                          int max_features) {
-  const Grid<std::uint8_t> grey = GreyOf(io::ReadImage(photo));
+  const Grid<std::uint8_t> grey =
+      GreyOf(io::ReadImage(photo, {.memory_gb = 0}));  // it was written within it
   Mask mask;
   if (!mask_file.empty()) mask = io::ReadMask(mask_file);
   if (!mask.empty() && (mask.width() != grey.width() || mask.height() != grey.height())) {

@@ -154,9 +154,9 @@ std::vector<SmallFeatures> SmallFeaturesOfFiles(std::span<const std::filesystem:
   ParallelFor(0, static_cast<int>(files.size()), threads, [&](int i) {
     progress.ThrowIfInterrupted();
     const auto index = static_cast<size_t>(i);
-    const io::ImageHeader header = io::ReadImageHeader(files[index]);
+    const io::ImageHeader header = io::ReadImageHeader(files[index], memory_gb);
     const auto share = memory.TakeForPhoto(header.width_px, header.height_px);
-    features[index] = SmallFeaturesOf(io::ReadImage(files[index]));
+    features[index] = SmallFeaturesOf(io::ReadImage(files[index], {.memory_gb = memory_gb}));
     progress.Update(++done);
   });
   return features;

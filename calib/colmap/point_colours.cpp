@@ -40,8 +40,8 @@ void ColourPoints(Workspace& workspace, calib::SfmModel& model) {
   ParallelFor(0, static_cast<int>(model.images.size()), workspace.threads(), [&](int i) {
     workspace.progress().ThrowIfInterrupted();
     const calib::SfmImage& image = model.images[static_cast<size_t>(i)];
-    samples[static_cast<size_t>(i)] =
-        SamplesOf(io::ReadImage(workspace.FileOf(index_of.at(image.name))), image);
+    samples[static_cast<size_t>(i)] = SamplesOf(
+        io::ReadImage(workspace.FileOf(index_of.at(image.name)), {.memory_gb = 0}), image);
   });
   std::map<std::uint64_t, ColourSum> sums;
   for (const auto& of_image : samples) {

@@ -28,7 +28,7 @@ bool SameSize(const FrameKind& a, int orientation_a, const FrameKind& b, int ori
 }  // namespace
 
 struct VideoReader::Parts {
-  explicit Parts(const std::filesystem::path& file) : decoder(file) {}
+  Parts(const std::filesystem::path& file, double memory_gb) : decoder(file, memory_gb) {}
 
   VideoDecoder decoder;
   const AVFrame* frame = nullptr;
@@ -39,8 +39,8 @@ struct VideoReader::Parts {
   std::optional<FrameConverter> converter;  // made for the first frame whose pixels are wanted
 };
 
-VideoReader::VideoReader(const std::filesystem::path& file)
-    : file_(file), parts_(std::make_unique<Parts>(file)) {
+VideoReader::VideoReader(const std::filesystem::path& file, double memory_gb)
+    : file_(file), parts_(std::make_unique<Parts>(file, memory_gb)) {
   const VideoDecoder& decoder = parts_->decoder;
   if (decoder.NeedsDolbyVision()) {
     throw Error(fmt::format(

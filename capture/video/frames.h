@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "dtr/io/image_io.h"
 #include "dtr/types/grid.h"
 
 namespace dtr::capture {
@@ -15,8 +16,9 @@ namespace dtr::capture {
 /// colour matrix and range, HDR and wide gamut (io::SrgbConverter), interlacing (bwdif).
 class VideoReader {
  public:
-  /// Throws Error where the file is no video.
-  explicit VideoReader(const std::filesystem::path& file);
+  /// Throws Error where the file is no video, or decoding it would take more memory than that, 1e9
+  /// bytes (0: no bound).
+  explicit VideoReader(const std::filesystem::path& file, double memory_gb = io::kImageMemoryGb);
   ~VideoReader();
 
   /// Goes to the next frame; false after the last one, where the rest cannot be decoded, and where

@@ -32,8 +32,10 @@ using Videos = std::vector<fs::path>;
 // Videos whose frames are taken together: one, or those of a rig.
 class Together {
  public:
-  explicit Together(const Videos& files) : files_(files) {
-    for (const fs::path& file : files) readers_.push_back(std::make_unique<VideoReader>(file));
+  Together(const Videos& files, double memory_gb) : files_(files) {
+    for (const fs::path& file : files) {
+      readers_.push_back(std::make_unique<VideoReader>(file, memory_gb));
+    }
   }
 
   // To the next time step that all have; false once one of the videos has no more.
@@ -148,7 +150,7 @@ struct Choice {
 
 Choice ChooseFrames(const Videos& files, const VideoOptions& options, Capture& reported,
                     Progress& progress) {
-  Together videos(files);
+  Together videos(files, options.memory_gb);
   videos.RequireOneRate();
   progress.Stage("choosing frames", videos.readers().front()->frames_promised());
   Choice choice;
@@ -192,7 +194,7 @@ void WriteFrames(const Videos& files, const std::vector<fs::path>& folders,
                  std::map<std::string, VideoFrame>& origins, Progress& progress) {
   progress.Stage("writing frames", static_cast<int>(frames.size()));
   for (const fs::path& folder : folders) fs::create_directories(top / folder);
-  Together videos(files);
+  Together videos(files, 0);  // they were decoded before, within the memory
   for (size_t next = 0; next < frames.size();) {
     if (!videos.Next()) {
       throw Error(fmt::format(

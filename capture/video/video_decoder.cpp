@@ -8,8 +8,10 @@
 #include <fstream>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "dtr/base/error.h"
+#include "dtr/base/memory_budget.h"
 #include "dtr/base/regular_file.h"
 #include "dtr/io/image_io.h"
 
@@ -84,7 +86,33 @@ bool BeginsAsVideo(const fs::path& file) {
       fmt::format("{}: FFmpeg cannot read it as a video: {}", file.string(), FfmpegError(code)));
 }
 
-Ffmpeg<AVFormatContext> OpenFormat(const fs::path& file) {
+// Frames that others refer to, and that threads decode at a time.
+constexpr double kBytesPerPixel = 40;
+
+std::int64_t MostPixels(double memory_gb) {
+  const auto limit = static_cast<double>(io::kImageLimitPx);
+  if (memory_gb <= 0) return static_cast<std::int64_t>(limit);
+  const double bytes = std::max(memory_gb * kBytesPerGigabyte, kAlwaysAllowedBytes);
+  return static_cast<std::int64_t>(std::min(bytes / kBytesPerPixel, limit));
+}
+
+// FFmpeg decodes some frames to learn of them.
+int FindStreamInfo(AVFormatContext* context, std::int64_t max_pixels) {
+  std::vector<AVDictionary*> options(context->nb_streams, nullptr);
+  for (AVDictionary*& one : options) av_dict_set_int(&one, "max_pixels", max_pixels, 0);
+  const int code = avformat_find_stream_info(context, options.data());
+  for (AVDictionary*& one : options) av_dict_free(&one);
+  return code;
+}
+
+void RequireMemoryFor(const fs::path& file, const AVCodecParameters& frames, double memory_gb) {
+  RequireMemory(
+      kBytesPerPixel * frames.width * frames.height, memory_gb,
+      fmt::format("{}: decoding {}x{} pixels", file.string(), frames.width, frames.height),
+      "give more, or a smaller video");
+}
+
+Ffmpeg<AVFormatContext> OpenFormat(const fs::path& file, std::int64_t max_pixels) {
   AVDictionary* options = nullptr;
   av_dict_set(&options, "protocol_whitelist", "file", 0);
   av_dict_set(&options, "format_whitelist", "mov,matroska,avi,flv,ogg,asf,mpegts,mpeg,mpegvideo",
@@ -96,19 +124,19 @@ Ffmpeg<AVFormatContext> OpenFormat(const fs::path& file) {
   av_dict_free(&options);
   if (code < 0) ThrowUnreadable(file, code);
   Ffmpeg<AVFormatContext> format(context);
-  code = avformat_find_stream_info(context, nullptr);
+  code = FindStreamInfo(context, max_pixels);
   if (code < 0) ThrowUnreadable(file, code);
   return format;
 }
 
 Ffmpeg<AVCodecContext> OpenCodec(const fs::path& file, const AVStream& stream,
-                                 const AVCodec* decoder) {
+                                 const AVCodec* decoder, std::int64_t max_pixels) {
   Ffmpeg<AVCodecContext> codec(avcodec_alloc_context3(decoder));
   int code = avcodec_parameters_to_context(codec.get(), stream.codecpar);
   if (code >= 0) {
     codec->pkt_timebase = stream.time_base;
     codec->thread_count = 0;  // all cores: the frames do not depend on it
-    codec->max_pixels = static_cast<std::int64_t>(io::kImageLimitPx);
+    codec->max_pixels = max_pixels;
     code = avcodec_open2(codec.get(), decoder, nullptr);
   }
   if (code < 0) ThrowUnreadable(file, code);
@@ -138,7 +166,7 @@ FrameNumbers::Time ShownTimeOf(const AVFrame& frame) {
 
 }  // namespace
 
-VideoDecoder::VideoDecoder(const fs::path& file)
+VideoDecoder::VideoDecoder(const fs::path& file, double memory_gb)
     : packet_(av_packet_alloc()), frame_(av_frame_alloc()), held_(av_frame_alloc()) {
   QuietFfmpeg();
   if (!fs::exists(file)) {
@@ -150,7 +178,7 @@ VideoDecoder::VideoDecoder(const fs::path& file)
                     "playlists are not followed, give the video itself",
                     file.string()));
   }
-  format_ = OpenFormat(file);
+  format_ = OpenFormat(file, MostPixels(memory_gb));
   const AVCodec* decoder = nullptr;
   stream_index_ = av_find_best_stream(format_.get(), AVMEDIA_TYPE_VIDEO, -1, -1, &decoder, 0);
   if (stream_index_ < 0 || decoder == nullptr) {
@@ -159,7 +187,8 @@ VideoDecoder::VideoDecoder(const fs::path& file)
   for (unsigned i = 0; i < format_->nb_streams; ++i) {
     if (static_cast<int>(i) != stream_index_) format_->streams[i]->discard = AVDISCARD_ALL;
   }
-  codec_ = OpenCodec(file, stream(), decoder);
+  RequireMemoryFor(file, *stream().codecpar, memory_gb);
+  codec_ = OpenCodec(file, stream(), decoder, MostPixels(memory_gb));
 }
 
 void VideoDecoder::CountDamaged() {

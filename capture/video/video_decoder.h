@@ -16,8 +16,9 @@ namespace dtr::capture {
 /// that interlaced frames are deinterlaced.
 class VideoDecoder {
  public:
-  /// Throws Error where FFmpeg does not read the file.
-  explicit VideoDecoder(const std::filesystem::path& file);
+  /// Throws Error where FFmpeg does not read the file, or its frames would take more memory than
+  /// that, 1e9 bytes (0: no bound).
+  VideoDecoder(const std::filesystem::path& file, double memory_gb);
 
   /// The next frame that could be decoded; nullptr after the last one. Valid until the next call.
   const AVFrame* Next();

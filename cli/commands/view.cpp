@@ -333,7 +333,7 @@ void ReturnFreedMemory() {
 #endif
 }
 
-int RunView(const Options& options, const Context& context) {
+int RunView(const Options& options, const Context& context, PromptEnd& end) {
   if (!options.screenshot.empty()) {
     RequireOutputFile(options.screenshot, "--screenshot", {".png", ".jpg", ".jpeg"});
     if (options.frames == 0) throw UsageError("--screenshot: expected --frames N with it");
@@ -346,7 +346,6 @@ int RunView(const Options& options, const Context& context) {
   const DtrSet set = io::ReadSet(options.set);
   const std::string warning = io::ValidationWarning(set);
   if (!warning.empty()) context.console.Note(warning);
-  PromptEnd end(context.console);
   const viewer::AppReport report =
       viewer::RunViewer(SettingsOf(options, context, set), MakeHost(options, context, end));
   context.console.ThrowIfInterrupted();
@@ -421,8 +420,9 @@ void AddViewCommand(CLI::App& app) {
                         "and read again [4]");
         options->render = AddRenderOptions(command, WholeFrames());
         return [options, &command](const Context& context) {
+          PromptEnd end(context.console);
           UseStoredOptions(command, io::ReadSet(options->set), *options->render);
-          return RunView(*options, context);
+          return RunView(*options, context, end);
         };
       });
 }

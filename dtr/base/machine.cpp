@@ -43,8 +43,8 @@ size_t PeakMemoryBytesWithPrograms() {
 }
 
 double MachineMemoryBytes() {
-  const double machine = static_cast<double>(sysconf(_SC_PHYS_PAGES)) *
-                         static_cast<double>(sysconf(_SC_PAGESIZE));
+  const double machine =
+      static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
   rlimit limit{};
   if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return machine;
   return std::min(machine, static_cast<double>(limit.rlim_cur));

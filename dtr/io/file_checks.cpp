@@ -88,8 +88,8 @@ std::uint64_t MaxPxPerByte(const fs::path& file, const std::string& format) {
   if (format == "png") return std::max<std::uint64_t>(1, kDeflate * kBits / PngBits(file));
   // A block of 8x8 pixels takes a bit of its brightness at least.
   if (format == "jpeg") return 64 * kBits;
-  if (format == "hdr") return 16;  // runs of at most 127 of each of four channels, in two bytes
-  if (format == "pnm") return kBits;    // not packed
+  if (format == "hdr") return 16;     // runs of at most 127 of each of four channels, in two bytes
+  if (format == "pnm") return kBits;  // not packed
   // Runs of at most 128 bytes, in two of them; sensors' numbers pack less.
   if (format == "targa" || format == "psd" || format == "dpx" || format == "raw") return 64 * kBits;
   return kDeflate * kBits;

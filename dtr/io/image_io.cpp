@@ -193,8 +193,8 @@ double ReadBytesOf(const OIIO::ImageInput& in, const fs::path& file, bool conver
   constexpr double kRgb = 3, kMask = 1;
   constexpr double kCoarser = (3 * sizeof(float) + 1) / 3.0;  // FillUnusable: all halvings
   const double reading = colours * (as_floats ? 1 + sizeof(float) : 1) + alpha;
-  const double masking = kRgb + (colours < kRgb ? colours : 0) +
-                         (has_alpha ? alpha + kMask + kCoarser : 0);
+  const double masking =
+      kRgb + (colours < kRgb ? colours : 0) + (has_alpha ? alpha + kMask + kCoarser : 0);
   const double rotating = 2 * kRgb + (has_alpha ? alpha + 2 * kMask : 0);
   const double bytes_per_px = std::max({reading, masking, rotating});
   return DecoderBytes(in, file) + bytes_per_px * spec.width * spec.height;
@@ -262,9 +262,9 @@ ImageAndMask ReadImageAndMask(const fs::path& file, const ImageReadOptions& opti
   return {std::move(pixels), std::move(mask), alpha.counts()};
 }
 
-Mask ReadMask(const fs::path& file, std::uint64_t limit_px) {
-  const auto in = OpenImage(file, {limit_px});
-  ExpectMemory(*in, file, ReadBytesOf(*in, file, false), kImageMemoryGb);
+Mask ReadMask(const fs::path& file, std::uint64_t limit_px, double memory_gb) {
+  const auto in = OpenImage(file, {limit_px, memory_gb});
+  ExpectMemory(*in, file, ReadBytesOf(*in, file, false), memory_gb);
   Mask mask(in->spec().width, in->spec().height);
   ReadPixels(*in, file, 0, 1, TypeDesc::UINT8, mask.data().data());
   for (std::uint8_t& value : mask.data()) value = value >= 128 ? 255 : 0;

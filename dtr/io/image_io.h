@@ -125,7 +125,8 @@ struct AlphaTotals {
 /// Reads a mask: the first channel, usable (255) from half of full scale up, else 0. A mask that
 /// went through JPEG thus keeps its shape. Where the mask itself has alpha, that must be at least
 /// one half too. Throws like ReadImage.
-Mask ReadMask(const std::filesystem::path& file, std::uint64_t limit_px = kImageLimitPx);
+Mask ReadMask(const std::filesystem::path& file, std::uint64_t limit_px = kImageLimitPx,
+              double memory_gb = kImageMemoryGb);
 
 inline constexpr int kDefaultJpegQuality = 95;
 

@@ -68,8 +68,8 @@ auto Decoded(const fs::path& file, const Decode& decode) {
 void ExpectAtMost(const fs::path& file, std::uint64_t width, std::uint64_t height,
                   std::uint64_t limit_px) {
   if (height == 0 || width <= limit_px / height) return;
-  throw Error(file.string() + ": expected at most " + std::to_string(limit_px) +
-              " pixels, found " + std::to_string(width) + "x" + std::to_string(height));
+  throw Error(file.string() + ": expected at most " + std::to_string(limit_px) + " pixels, found " +
+              std::to_string(width) + "x" + std::to_string(height));
 }
 
 void ExpectMemoryFor(const fs::path& file, std::uint64_t width, std::uint64_t height, double bytes,
@@ -84,7 +84,7 @@ void ExpectWithin(const fs::path& file, const std::optional<WholeImage>& image,
                   const OpenLimits& limits) {
   if (!image) return;
   ExpectAtMost(file, image->width_px, image->height_px, limits.px);
-  ExpectPlausibleSize(file, image->width_px, image->height_px, "");
+  ExpectPlausibleSize(file, image->width_px, image->height_px, image->format);
   ExpectMemoryFor(file, image->width_px, image->height_px, image->bytes(), limits.memory_gb);
 }
 
@@ -117,6 +117,10 @@ std::unique_ptr<OIIO::ImageInput> OpenImage(const fs::path& file, const OpenLimi
   const auto height = static_cast<std::uint64_t>(spec.height);
   ExpectAtMost(file, width, height, limits.px);
   ExpectPlausibleSize(file, width, height, in->format_name());
+  if (spec.tile_width > 0 && spec.tile_height > 0) {
+    ExpectPlausibleSize(file, static_cast<std::uint64_t>(spec.tile_width),
+                        static_cast<std::uint64_t>(spec.tile_height), in->format_name());
+  }
   return in;
 }
 
@@ -126,12 +130,12 @@ double DecoderBytes(const OIIO::ImageInput& in, const fs::path& file) {
   const std::string format = in.format_name();
   // LibRaw: the sensor's numbers, four channels of 16 bits, and what it makes of them.
   constexpr double kRawBytes = 24;
-  // Progressive ones: the coefficients of all channels.
-  constexpr double kJpegBytes = 2;
   const double bytes_per_px = format == "raw"    ? kRawBytes
-                              : format == "jpeg" ? kJpegBytes * spec.nchannels
+                              : format == "jpeg" ? 0
                                                  : static_cast<double>(spec.pixel_bytes(true));
-  return bytes_per_px * spec.width * spec.height;
+  const double pixels = static_cast<double>(spec.width) * spec.height;
+  // A tile may be larger than its image.
+  return bytes_per_px * std::max(pixels, static_cast<double>(spec.tile_width) * spec.tile_height);
 }
 
 void ExpectMemory(const OIIO::ImageInput& in, const fs::path& file, double bytes,
@@ -142,8 +146,8 @@ void ExpectMemory(const OIIO::ImageInput& in, const fs::path& file, double bytes
 
 void ReadPixels(OIIO::ImageInput& in, const fs::path& file, int first_channel, int end_channel,
                 OIIO::TypeDesc type, void* pixels) {
-  const bool read = Decoded(
-      file, [&] { return in.read_image(0, 0, first_channel, end_channel, type, pixels); });
+  const bool read =
+      Decoded(file, [&] { return in.read_image(0, 0, first_channel, end_channel, type, pixels); });
   const std::string complaint = in.geterror();
   if (!read || !complaint.empty()) {
     throw Error(file.string() + ": damaged image: " + OneLine(complaint));

@@ -192,7 +192,7 @@ Json HostInfo() {
 namespace {
 
 // "73 kB", "1.4 MB".
-std::string SizeText(std::uint64_t bytes) {
+std::string BytesText(std::uint64_t bytes) {
   return bytes < 1'000'000 ? std::to_string((bytes + 999) / 1000) + " kB" : Megabytes(bytes);
 }
 
@@ -201,7 +201,7 @@ std::string PartsLine(const std::vector<SetPart>& parts) {
   for (const SetPart& part : parts) {
     std::string name = part.name;
     std::replace(name.begin(), name.end(), '_', ' ');
-    line += (line.empty() ? "" : ", ") + name + " " + SizeText(part.bytes);
+    line += (line.empty() ? "" : ", ") + name + " " + BytesText(part.bytes);
   }
   return line;
 }

@@ -201,7 +201,7 @@ void LoadPixels(const fs::path& set_folder, View& view, const LoadOptions& optio
     const fs::path file = set_folder / view.mask_file->path;
     const ImageHeader header = ReadImageHeader(file, options.memory_gb);
     ExpectViewSize(file, view, header.width_px, header.height_px);
-    view.mask = ReadMask(file);
+    view.mask = ReadMask(file, kImageLimitPx, options.memory_gb);
   }
   const int depth_width_px = view.camera.width_px() / view.depth_scale;
   const int depth_height_px = view.camera.height_px() / view.depth_scale;

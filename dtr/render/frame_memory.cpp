@@ -22,9 +22,7 @@ double Pixels(int width_px, int height_px) { return static_cast<double>(width_px
 
 }  // namespace
 
-double FrameBytes(int width_px, int height_px) {
-  return kFrameBytes * Pixels(width_px, height_px);
-}
+double FrameBytes(int width_px, int height_px) { return kFrameBytes * Pixels(width_px, height_px); }
 
 double VideoBytes(int width_px, int height_px) { return kVideoBytes * Pixels(width_px, height_px); }
 

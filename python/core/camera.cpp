@@ -5,6 +5,7 @@
 #include "dtr/base/error.h"
 #include "dtr/io/formats/cameras_json.h"
 #include "dtr/io/formats/pose_from_matrix.h"
+#include "dtr/types/computable.h"
 
 namespace dtr::python {
 
@@ -32,11 +33,18 @@ PinholeCamera CameraFrom(const Eigen::Matrix3d& k, int width_px, int height_px,
 }
 
 Pose PoseFrom(const Eigen::Matrix4d& cam_from_world, const std::string& what) {
+  Pose pose;
   try {
-    return io::PoseFromMatrix(cam_from_world, io::kRotationTolerance, what + ": `cam_from_world`");
+    pose = io::PoseFromMatrix(cam_from_world, io::kRotationTolerance, what + ": `cam_from_world`");
   } catch (const Error& error) {
     throw UsageError(error.what());
   }
+  const double away = pose.translation.cwiseAbs().maxCoeff();
+  if (away <= kMaxLength) return pose;
+  throw UsageError(
+      fmt::format("{}: `cam_from_world`: expected a camera within {:g} units of the origin, found "
+                  "{:.3g}; use another unit or origin",
+                  what, kMaxLength, away));
 }
 
 }  // namespace dtr::python

@@ -17,7 +17,8 @@ Eigen::Matrix3d MatrixOf(const PinholeCamera& camera);
 
 /// Inverses of that and of io::MatrixFromPose. Throw UsageError, one line that begins with `what`,
 /// where K is not finite, has skew or another last row, focal lengths are not positive, a size is
-/// not 1...65536, or the pose's rotation is none to 1e-6 (then the nearest one is taken).
+/// not 1...65536, the pose is farther than kMaxLength, or its rotation is none to 1e-6 (otherwise
+/// the nearest one is taken).
 PinholeCamera CameraFrom(const Eigen::Matrix3d& k, int width_px, int height_px,
                          const std::string& what);
 Pose PoseFrom(const Eigen::Matrix4d& cam_from_world, const std::string& what);

@@ -19,6 +19,7 @@ struct UnlockedThreads {
   std::mutex mutex;
   std::set<Unlocked*> all;
   bool ending = false;
+  bool forked = false;   ///< this process is a fork of the one that loaded the module
   std::thread::id ends;  ///< the thread that ends the interpreter, and may go on calling us
 
   static UnlockedThreads& Get() {
@@ -78,12 +79,13 @@ void BeforeTheEnd() {
   PyEval_RestoreThread(thread);
 }
 
-/// The last function that the C library calls before destructors of static objects.
+/// The last function that the C library calls before destructors of static objects. In a forked
+/// process they would wait for threads that are the parent's alone (those of log4cplus do).
 void EndWithoutDestructors(int status, void*) {
   UnlockedThreads& threads = UnlockedThreads::Get();
   {
     const std::lock_guard lock(threads.mutex);
-    if (threads.all.empty()) return;
+    if (threads.all.empty() && !threads.forked) return;
   }
   std::fflush(nullptr);
   _exit(status);
@@ -99,6 +101,7 @@ void AfterForkInParent() { UnlockedThreads::Get().mutex.unlock(); }
 void AfterForkInChild() {
   UnlockedThreads& threads = UnlockedThreads::Get();
   threads.all.clear();  // their threads are the parent's alone
+  threads.forked = true;
   threads.mutex.unlock();
 }
 

@@ -15,7 +15,7 @@ from . import _core
 from ._jobs import PathLike, ProgressCallback, run
 from ._set import Set, load
 
-_MAX_DEPTH = 1e30  # as of depth maps that are imported: kMaxForeignDepth
+_MIN_DEPTH, _MAX_DEPTH = 1e-18, 1e18  # dtr/types/computable.h
 _MAX_NAME_BYTES = 200  # file systems hold 255, extensions among them
 
 
@@ -62,12 +62,12 @@ def _depth(depth: Any, what: str, image: npt.NDArray[np.uint8]) -> Optional[npt.
         )
     with np.errstate(over="ignore"):
         narrow = np.ascontiguousarray(array, dtype=np.float32)
-    wrong = ~((narrow >= 0) & (narrow <= _MAX_DEPTH))
+    wrong = ~((narrow == 0) | ((narrow >= _MIN_DEPTH) & (narrow <= _MAX_DEPTH)))
     if wrong.any():
         y, x = np.argwhere(wrong)[0]
         raise _fail(
-            f"{what}: expected depths from 0 (a hole) to {_MAX_DEPTH:g}, found {array[y, x]} "
-            f"at x {x}, y {y}"
+            f"{what}: expected depths from {_MIN_DEPTH:g} to {_MAX_DEPTH:g}, or 0 for a hole, found "
+            f"{array[y, x]} at x {x}, y {y}"
         )
     return narrow if narrow.any() else None  # as held-out views of a set are read
 
@@ -124,7 +124,11 @@ class ArraysSet:
             if "depth" in arguments:
                 arguments.update(completion=completion, **self._held_out(options))
             arguments.update(options, force=force, output=path)
-            run("import", progress=progress, **arguments)
+            try:
+                run("import", progress=progress, **arguments)
+            except _core.Error as error:  # of arrays, not of files that nobody knows
+                shown = str(error).replace(f"{arguments['cameras']}", "from_arrays")
+                raise type(error)(shown.replace(f"{folder}/", "from_arrays: ")) from None
         return load(path)
 
     def _held_out(self, options: dict[str, Any]) -> dict[str, Any]:

@@ -192,7 +192,10 @@ TEST_F(BadInput, SetsCutShort) {
   const std::string text = Text(Shared("good.dtr/set.json"));
   const fs::path set = Copy();
   constexpr size_t kCuts = 12;  // tests/io cuts in-process, 13 bytes at a time
-  for (size_t i = 0; i < kCuts; ++i) {
+  WriteFileAtomically(set / "set.json", "");
+  ExpectRejected(Dtr({"info", set.string()}), kFailed,
+                 "expected JSON, found an empty file; copy it again");
+  for (size_t i = 1; i < kCuts; ++i) {
     WriteFileAtomically(set / "set.json", text.substr(0, i * (text.size() - 1) / kCuts));
     ExpectRejected(Dtr({"info", set.string()}), kFailed,
                    "expected JSON, found an error after byte");
@@ -211,6 +214,8 @@ TEST_F(BadInput, SetsWithWrongFields) {
                  "expected JSON, found an error after byte");
   ExpectRejected(InfoAfter("\"translation\": [", "\"translation\": [null, "), kFailed,
                  "cam_from_world.translation: expected 3 numbers");
+  ExpectRejected(InfoAfter("\"translation\": [", "\"translation\": [1e300, 0, 0], \"old\": ["),
+                 kFailed, "cam_from_world.translation: expected 3 numbers within 1e+18 of 0");
   ExpectRejected(InfoAfter("\"fx_px\": ", "\"fx_px\": -"), kFailed,
                  "camera.fx_px: expected a positive number");
   ExpectRejected(InfoAfter("\"images/0001.png\"", "\"../0001.png\""), kFailed,

@@ -1,4 +1,5 @@
 // What `dtr import` takes and rejects: cameras, depth and masks of other programs.
+#include "dtr/io/formats/npy.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "tests/cli/refusals.h"
@@ -76,6 +77,41 @@ TEST_F(Rejections, FocalLengthsThatCannotBe) {
               std::string::npos)
         << ran.err;
   }
+  EXPECT_FALSE(fs::exists(In("set.dtr")));
+}
+
+TEST_F(Rejections, NumbersThatCannotBeComputedWith) {
+  Json far = Cameras(), near = Cameras(), npy = Cameras();
+  far["views"][2]["cam_from_world"][0][3] = 1e300;
+  for (Json& view : near["views"]) {
+    for (int row = 0; row < 3; ++row) {
+      const double length = view["cam_from_world"][static_cast<size_t>(row)][3].get<double>();
+      view["cam_from_world"][static_cast<size_t>(row)][3] = 1e-150 * length;
+    }
+  }
+  const std::string depth = Folder("depth");
+  fs::copy(Shared("courtyard/depth"), depth, fs::copy_options::recursive);
+  fs::remove(In("depth/0001.exr"));
+  Grid<float> numbers(kCourtyardWidthPx, kCourtyardHeightPx, 1, 2.0F);
+  numbers(5, 3) = 3e38F;
+  io::WriteNpy(In("depth/0001.npy"), numbers);
+  npy["views"][1]["depth"] = "0001.npy";
+  const auto import = [&](const Json& cameras, std::vector<std::string> further) {
+    further.insert(further.begin(), {"import", "--cameras", Write("cameras.json", cameras.dump()),
+                                     "--images", Photos(), "-o", In("set.dtr")});
+    return Dtr(further);
+  };
+  ExpectRejected(import(far, {"--depth", Shared("courtyard/depth")}), kFailed,
+                 "units from the origin, cannot be computed with");
+  ExpectRejected(import(near, {"--depth", Shared("courtyard/depth")}), kFailed,
+                 "units of each other, cannot be computed with; give positions");
+  const Ran sky = import(npy, {"--depth", depth});
+  ExpectRejected(sky, kFailed, "cannot be computed with; give depths from");
+  EXPECT_NE(sky.err.find("depth/0001.npy: its depth of 3e+38 units at pixel (5, 3) cannot"),
+            std::string::npos);
+  ExpectRejected(
+      import(Cameras(), {"--depth", Shared("courtyard/depth"), "--depth-unit", "1e-150"}),
+      kWrongUsage, "with which can be computed");
   EXPECT_FALSE(fs::exists(In("set.dtr")));
 }
 

@@ -37,11 +37,11 @@ class Worlds : public ::testing::Test {
     const fs::path out = set.string() + ".pictures";
     fs::create_directories(out);
     DtrOk({"render", set.string(), "--renderer", "cpu", "--like", "0003", "--exclude", "0003", "-o",
-           (out / "like.png").string()});
+           (out / "like.png").string(), "--force"});
     DtrOk({"render", set.string(), "--renderer", "cpu", "--like", "0002", "--exclude", "0002",
-           "--primitive", "splat", "-o", (out / "splat.png").string()});
+           "--primitive", "splat", "-o", (out / "splat.png").string(), "--force"});
     DtrOk({"render", set.string(), "--renderer", "cpu", "--fly-through", "2", "-o",
-           (out / "path").string()});
+           (out / "path").string(), "--force"});
     std::vector<ImageRgb8> pictures;
     for (const char* name : {"like.png", "splat.png", "path/000000.png", "path/000001.png"}) {
       pictures.push_back(io::ReadImage(out / name));

@@ -89,8 +89,18 @@ class RoundTrip(WithSet):
         with self.assertRaisesRegex(dtr.UsageError, "`names`: expected no comma .*, found 'a,b'"):
             dtr.from_arrays(images, depths, K, poses, names=names).save(self.folder / "never.dtr")
 
+    def test_what_the_import_rejects_names_no_temporary_file(self):
+        images, depths, K, poses = wall()
+        for wrong_K, wrong_poses, text in ((np.diag([1e9, 1e9, 1.0]), poses, r"from_arrays: views\[0\] \(0000\.png\)"),
+                                           (K, poses * 1e-30 + np.eye(4), "from_arrays: its cameras")):
+            wrong_poses[:, 3], wrong_poses[:, :3, :3] = np.eye(4)[3], np.eye(3)
+            made = dtr.from_arrays(images, depths, wrong_K, wrong_poses)
+            with self.assertRaisesRegex(dtr.Error, "^" + text) as caught:
+                made.save(self.folder / "never.dtr")
+            self.assertNotIn("/dtr-", str(caught.exception))
+
     def test_depth_of_any_scene(self):
-        for scale in (1e-30, 1e-6, 1e6, 1e30):
+        for scale in (1e-17, 1e-6, 1e6, 1e17):
             images, depths, K, poses = wall(z=scale)
             poses[:, 0, 3] *= scale
             s = dtr.from_arrays(images, depths, K, poses).save(self.folder / f"{scale}.dtr")
@@ -131,10 +141,10 @@ class Hostile(unittest.TestCase):
             return lambda a: a["depths"].__setitem__(2, depth)
 
         bad = np.full((32, 48), 4, np.float32)
-        for value in (np.nan, np.inf, -np.inf, -1, 1e300, 3e38):
+        for value in (np.nan, np.inf, -np.inf, -1, 1e-30, 1e300, 3e38):
             wrong = bad.astype(np.float64)
             wrong[7, 11] = value
-            self.rejected(r"`depths` 2: expected depths from 0 \(a hole\) to 1e\+30, .* at x 11, y 7", spoil(wrong))
+            self.rejected(r"`depths` 2: expected depths from 1e-18 to 1e\+18, or 0 for a hole, .* at x 11, y 7", spoil(wrong))
         self.rejected("`depths` 2: .*a whole fraction", spoil(np.ones((31, 48), np.float32)))
         self.rejected("`depths` 2: .*a whole fraction", spoil(np.ones((64, 96), np.float32)))
         self.rejected("`depths` 2: .*found .* of int64", spoil(np.ones((32, 48), np.int64)))
@@ -160,6 +170,7 @@ class Hostile(unittest.TestCase):
         self.rejected("view 1: Camera: `cam_from_world`", pose(1, 0, 3, np.nan))
         self.rejected("view 1: Camera: `cam_from_world`", pose(1, 0, 0, -1))  # a mirror
         self.rejected("view 2: Camera: `cam_from_world`", pose(2, 3, 0, 1))
+        self.rejected(r"view 1: Camera: `cam_from_world`: expected a camera within 1e\+18 units", pose(1, 0, 3, 1e300))
         self.rejected("`poses`: expected numbers", lambda a: a.update(poses=np.zeros((3, 3, 3))))
 
     def test_the_rest(self):

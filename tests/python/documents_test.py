@@ -46,6 +46,14 @@ class Documents(WithSet):
                 exec(compile(text, "docs/PYTHON.md", "exec"), names)
         self.assertTrue(shown.getvalue())
 
+    def test_the_line_of_the_readme(self):
+        code = re.search(r"`(import dtr; [^`]+)`", (ROOT / "README.md").read_text())[1]
+        names = {}
+        exec(code.replace("out/plaza.dtr", str(self.folder / "scene.dtr")), names)
+        view = names["s"][re.search(r's\["(\w+)"\]\.depth', code)[1]]
+        self.assertEqual(view.role, "source")
+        self.assertTrue(view.depth.any())
+
     def run_example(self, name, *words, code=0):
         done = subprocess.run([sys.executable, EXAMPLES / name, *map(str, words)], capture_output=True, text=True,
                               cwd=self.folder)

@@ -15,7 +15,7 @@ from small_sets import WithSet, run_program
 
 class Rendering(WithSet):
     def compare(self, frame, *words):
-        run_program("render", self.path, *words, "-o", self.folder / "frame.png", "--depth-out",
+        run_program("render", self.path, *words, "--force", "-o", self.folder / "frame.png", "--depth-out",
                     self.folder / "depth.exr", "--coverage-out", self.folder / "coverage.png")
         # Written from the arrays by the same writers: equal pixels are equal files.
         dtr._core.write_image(self.folder / "ours.png", frame.image)

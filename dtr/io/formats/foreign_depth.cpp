@@ -146,9 +146,8 @@ DepthImage ReadDepthOfAnySize(const std::filesystem::path& file, DepthKind kind,
                               int width_px, int height_px, std::uint64_t limit_px) {
   constexpr std::uint64_t kMaxPerPixel = 16;  // four times finer than the photo per axis
   RequireUnit(file, unit_scale);
-  const Grid<float> numbers =
-      ReadNumbers(file, std::min(limit_px, kMaxPerPixel * PixelsOf(width_px, height_px)),
-                  width_px, height_px);
+  const Grid<float> numbers = ReadNumbers(
+      file, std::min(limit_px, kMaxPerPixel * PixelsOf(width_px, height_px)), width_px, height_px);
   return Scaled(file, numbers, kind, unit_scale);
 }
 

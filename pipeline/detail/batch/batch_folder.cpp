@@ -95,6 +95,7 @@ FileLock LockBatch(const fs::path& set) {
   fs::create_directories(folder.parent_path(), error);
   if (error) throw Error(folder.string() + ": cannot be made: " + error.message());
   MakeFolder(folder);
+  RequireOwnBatch(set);  // another user may have been first
   auto lock = FileLock::Try(folder / kLock);
   if (!lock) {
     throw UsageError(folder.string() + ": another dtr batch works on this set; wait for it");

@@ -65,7 +65,7 @@ std::uint64_t LimitOf(const PinholeCamera& camera) {
 
 Mask ReadCameraMask(const io::NamedCamera& named, const ImportOptions& options) {
   const fs::path file = MaskFolder(options) / named.mask_file;
-  const Mask mask = io::ReadMask(file, LimitOf(named.camera));
+  const Mask mask = io::ReadMask(file, LimitOf(named.camera), options.memory_gb);
   if (mask.width() != named.camera.width_px() || mask.height() != named.camera.height_px()) {
     throw Error(file.string() + ": expected a mask of " +
                 SizeText(named.camera.width_px(), named.camera.height_px()) + " pixels, found " +

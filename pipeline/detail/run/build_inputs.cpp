@@ -48,7 +48,7 @@ std::vector<std::pair<int, int>> SizesOf(const BuildOptions& options,
                                          const std::vector<bool>& held_out) {
   std::vector<std::pair<int, int>> sizes;
   for (const std::filesystem::path& file : capture::VideosOf(options.photos)) {
-    capture::VideoReader video(file);
+    capture::VideoReader video(file, 0);  // it was decoded before, within the memory
     if (!video.Next()) continue;
     const ImageRgb8 picture = video.Picture();
     sizes.emplace_back(picture.width(), picture.height());
