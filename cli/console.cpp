@@ -50,6 +50,7 @@ std::string TimeLeft(double spent_s, double share) {
 void CatchInterrupts() {
   signal(SIGINT, OnInterrupt);
   signal(SIGTERM, OnInterrupt);
+  signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is a write that fails
   // A terminal that is lost; nohup ignores it.
   if (signal(SIGHUP, OnInterrupt) == SIG_IGN) signal(SIGHUP, SIG_IGN);
 }

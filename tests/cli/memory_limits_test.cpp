@@ -105,20 +105,6 @@ TEST_F(MemoryLimits, ImagesWithinTheLimitAreRendered) {
   EXPECT_EQ(io::ReadImageHeader(In("image.png")).width_px, 4000);
 }
 
-TEST_F(MemoryLimits, HostileImagesAmongPhotosAreSkippedAndNamed) {
-  const fs::path photos = PhotosAndHostileOnes();
-  for (const auto& [name, bytes] : HostileImages(0)) WriteFileAtomically(photos / name, bytes);
-  const Ran ran = DtrWithin(kSpaceGb, {"capture", photos.string(), "-o", In("capture"), "--memory",
-                                       "0.5", "--json", In("capture.json")});
-  ASSERT_EQ(ran.code, 0) << ran.err;
-  const Json json = Json::parse(Text(In("capture.json")));
-  EXPECT_EQ(json["photos"].size(), static_cast<size_t>(kCourtyardViews));
-  EXPECT_EQ(json["skipped"].size(), 3 + HostileImages(0).size());
-  EXPECT_THAT(ran.err, HasSubstr("z65535.gif: damaged image: expected as many pixels as "));
-  EXPECT_THAT(ran.err, HasSubstr("zpadded.gif: reading its 19000x19000 pixels takes 2.89 GB of "
-                                 "memory, more than --memory 0.5; give more, or shrink"));
-}
-
 TEST_F(MemoryLimits, ABuildSkipsThemAsWell) {
   const Ran ran =
       DtrWithin(kSpaceGb, {"build", PhotosAndHostileOnes().string(), "-o", In("set.dtr"), "--poses",

@@ -375,10 +375,10 @@ TEST_F(Rejections, TooLittleMemoryIsSaidInOneLine) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "the sanitizer takes addresses without end";
 #endif
-  // Room to start in, and less than the image: 16384 x 16384 pixels.
+  // Room to start in, and less than the image: 8192 x 8192 pixels.
   const Ran ran = Shell(
-      fmt::format("ulimit -v 1500000; exec {} render {} --renderer cpu --threads 1 --like 0001 "
-                  "--size 16384x16384 -o {}",
+      fmt::format("ulimit -v 900000; exec {} render {} --renderer cpu --threads 1 --like 0001 "
+                  "--size 8192x8192 --memory 100 -o {}",
                   DTR_PROGRAM, Shared("good.dtr"), In("view.png")));
   ExpectRejected(ran, kFailed, "memory: expected enough for this job, found too little");
   EXPECT_FALSE(fs::exists(In("view.png")));

@@ -27,9 +27,7 @@ OutputFolder::OutputFolder(fs::path folder, const std::string& kind,
                            const std::vector<std::string>& names, bool force)
     : folder_(std::move(folder)), mark_(folder_ / WorkFolder::MarkOf(kind)) {
   if (!force && !fs::exists(mark_)) RequireFree(folder_, names);
-  std::error_code error;
-  fs::create_directories(folder_, error);
-  if (error) throw Error(folder_.string() + ": cannot be made: " + error.message());
+  fs::create_directories(folder_);
   lock_ = WorkFolder::Lock(folder_, kind);
 }
 
