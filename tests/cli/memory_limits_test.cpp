@@ -105,6 +105,26 @@ TEST_F(MemoryLimits, ImagesWithinTheLimitAreRendered) {
   EXPECT_EQ(io::ReadImageHeader(In("image.png")).width_px, 4000);
 }
 
+TEST_F(MemoryLimits, HostileImagesAmongPhotosAreSkippedAndNamed) {
+  const fs::path photos = PhotosAndHostileOnes();
+  for (const auto& [name, bytes] : HostileImages(0)) WriteFileAtomically(photos / name, bytes);
+  const Ran ran = DtrWithin(kSpaceGb, {"capture", photos.string(), "-o", In("capture"), "--memory",
+                                       "0.5", "--json", In("capture.json")});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const Json json = Json::parse(Text(In("capture.json")));
+  EXPECT_EQ(json["photos"].size(), static_cast<size_t>(kCourtyardViews));
+  EXPECT_EQ(json["skipped"].size(), 3 + HostileImages(0).size());
+  const auto reason_of = [&](const std::string& name) {
+    for (const Json& skipped : json["skipped"]) {
+      if (skipped["name"] == name) return skipped["reason"].get<std::string>();
+    }
+    return std::string();
+  };
+  EXPECT_THAT(reason_of("z65535.gif"), HasSubstr("expected as many pixels as "));
+  EXPECT_THAT(reason_of("zpadded.gif"),
+              HasSubstr("reading its 19000x19000 pixels takes 2.89 GB of memory, more than "));
+}
+
 TEST_F(MemoryLimits, ABuildSkipsThemAsWell) {
   const Ran ran =
       DtrWithin(kSpaceGb, {"build", PhotosAndHostileOnes().string(), "-o", In("set.dtr"), "--poses",
@@ -149,15 +169,21 @@ TEST_F(MemoryLimits, CamerasAndImagesOfAnImport) {
 TEST_F(MemoryLimits, ViewsOfASetThatAreTooLargeAreLeftOut) {
   fs::copy(Shared("good.dtr"), In("set.dtr"), fs::copy_options::recursive);
   Json set = Json::parse(Text(In("set.dtr/set.json")));
-  for (Json& view : set["views"]) {
+  for (Json& view : set["frames"][0]["views"]) {
     if (view["name"] == "0001.jpg") continue;
     view["camera"]["width_px"] = view["camera"]["height_px"] = 19008;
   }
   WriteFileAtomically(In("set.dtr/set.json"), set.dump());
-  const Ran ran = DtrWithin(kSpaceGb, {"render", In("set.dtr"), "--like", "0001", "-o",
-                                       In("image.png"), "--memory", "1"});
-  EXPECT_EQ(ran.code, 0) << ran.err;
-  EXPECT_THAT(ran.err, HasSubstr("reading 19008x19008 pixels takes "));
+  const auto render = [&](const std::string& excluded) {
+    return DtrWithin(kSpaceGb, {"render", In("set.dtr"), "--like", "0001", "--exclude", excluded,
+                                "-o", In(excluded + ".png"), "--memory", "1"});
+  };
+  const Ran others = render("0002");
+  EXPECT_EQ(others.code, 0) << others.err;
+  EXPECT_THAT(others.err, HasSubstr("WARNING: drawn from the nearest 1 of "));
+  const Ran none = render("0001");
+  ExpectRejected(none, kFailed, "views: expected at least one that can be read, found none");
+  EXPECT_THAT(none.err, HasSubstr("0002.jpg: reading 19008x19008 pixels takes 8.67 GB of memory"));
   ExpectRejected(DtrWithin(kSpaceGb, {"evaluate", In("set.dtr")}), kFailed,
                  "GB that there are; use a machine with more, or a set of fewer or smaller views");
 }
