@@ -21,7 +21,7 @@ class Console final : public Progress {
   void Stage(const std::string& name, int total) override;
   void Update(int done) override;
   void Note(const std::string& line) override;
-  bool StopRequested() const override;  ///< after Ctrl-C or SIGTERM
+  bool StopRequested() const override;  ///< after Ctrl-C, SIGTERM or SIGHUP
   std::string InterruptedLine() const override;
 
   /// Said by commands that go on where an interrupted run of theirs ended.
@@ -45,7 +45,8 @@ class Console final : public Progress {
   std::chrono::steady_clock::time_point stage_start_;
 };
 
-/// Installs handlers for SIGINT and SIGTERM that only set a flag; the second one kills.
+/// Installs handlers for SIGINT, SIGTERM and SIGHUP that only set a flag; the second one kills.
+/// SIGHUP stays ignored where it is (nohup).
 void CatchInterrupts();
 
 }  // namespace dtr::cli
