@@ -92,12 +92,12 @@ void AddCommand(CLI::App& app, const std::string& name, const std::string& descr
   command->add_option("--seed", common->seed, "Seed of everything random")->type_name("N");
   const Action action = prepare(*command);
   if (command->get_option_no_throw("--force") == nullptr) {
-    command->add_flag("--force", common->force, "Replace images of a folder, or an exported file, that exist");
+    command->add_flag("--force", common->force, "Replace output files that exist");
   }
   RejectWhatIsNoNumber(*command);
   // The exit code leaves through CLI::RuntimeError, CLI11's way of ending with a code of one's own.
   command->callback([command, common, action] {
-    RequireOutputs(*command);
+    RequireOutputs(*command, command->count("--force") > 0);
     const CalledApp* const called = CallerOf(*command);
     if (called != nullptr) common->json_text = &called->json();
     Console console =

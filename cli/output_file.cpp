@@ -54,7 +54,7 @@ constexpr std::array kOutputOptions{"--json",         "--output",     "-o",     
                                     "--coverage-out", "--screenshot", "--report", "--normals",
                                     "--state-file",   "--pictures"};
 
-constexpr char kSetFile[] = "set.json";
+constexpr char kSetFile[] = "set.json", kPageFile[] = "index.html";
 
 struct Output {
   std::string option;  // as the user knows it
@@ -102,10 +102,11 @@ bool LiesIn(const fs::path& inside, const fs::path& folder) {
          folder.end();
 }
 
-// A set, or one that is being written.
+// A set, or one that is being written. A web page that is a folder has a set.json, too.
 bool IsSet(const fs::path& folder) {
   std::error_code ignored;
-  return fs::is_regular_file(folder / kSetFile, ignored) ||
+  const bool is_page = fs::is_regular_file(folder / kPageFile, ignored);
+  return (fs::is_regular_file(folder / kSetFile, ignored) && !is_page) ||
          fs::is_regular_file(folder / "work" / "fingerprint.json", ignored);
 }
 
@@ -129,7 +130,7 @@ void RejectInput(const Output& output, const fs::path& place, const std::vector<
 
 }  // namespace
 
-void RequireOutputs(const CLI::App& command) {
+void RequireOutputs(const CLI::App& command, bool force) {
   Paths paths;
   CollectPaths(command, paths);
   // The result for programs is the one that gives way.
@@ -159,6 +160,9 @@ void RequireOutputs(const CLI::App& command) {
         fs::is_regular_file(place, ignored) && fs::file_size(place, ignored) > 0;
     if (!has_content || output.is_set) continue;
     RejectInput(output, place, paths.inputs);
+    if (force) continue;
+    throw UsageError(fmt::format("{} {}: exists already; choose another name or give --force",
+                                 output.option, output.path.string()));
   }
 }
 

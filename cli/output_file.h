@@ -20,9 +20,10 @@ void RequireOutputFile(const std::filesystem::path& file, const std::string& opt
 /// names of one file), and the options of single commands (kOutputOptions). Throws UsageError for
 /// an output
 /// - inside a D+TR set, or in the place of one, unless the command writes sets;
-/// - in the place of a file that is an input: named by another option, or in a folder that is.
+/// - in the place of a file that is an input: named by another option, or in a folder that is;
+/// - in the place of any other file with content, unless `force`.
 /// Pipes, devices and what lies below /dev are written in place and pass. Folders pass as well: who
 /// writes several files into one checks each (pipeline/detail/run/output_folder.h).
-void RequireOutputs(const CLI::App& command);
+void RequireOutputs(const CLI::App& command, bool force);
 
 }  // namespace dtr::cli

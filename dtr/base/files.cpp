@@ -63,7 +63,9 @@ fs::path WithoutTrailingSlash(const fs::path& path) {
 bool IsWrittenInPlace(const fs::path& file) {
   std::error_code ignored;
   const std::string whole = fs::absolute(file, ignored).lexically_normal().string();
-  if (whole.starts_with("/dev/") || whole.starts_with("/proc/")) return true;
+  for (const char* stream : {"/dev/fd/", "/dev/std", "/proc/"}) {
+    if (whole.starts_with(stream)) return true;  // may lead to a file that somebody else has open
+  }
   const fs::file_status there = fs::status(file, ignored);
   return fs::exists(there) && !fs::is_regular_file(there) && !fs::is_directory(there);
 }

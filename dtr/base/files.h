@@ -13,8 +13,8 @@ std::string ReadFile(const std::filesystem::path& file, std::uintmax_t limit_byt
 /// "x/" names the folder x: the path without separators at its end, so that a name can be appended.
 std::filesystem::path WithoutTrailingSlash(const std::filesystem::path& path);
 
-/// True for a pipe, a device or a socket, and for every name below /dev and /proc: what is written
-/// there goes to whoever reads it.
+/// True for a pipe, a device or a socket, and for names of open files (/dev/stdout, /dev/fd, /proc):
+/// what is written there goes to whoever reads it.
 bool IsWrittenInPlace(const std::filesystem::path& file);
 
 /// The path that a link leads to, link by link, also where nothing is there yet; any other path as

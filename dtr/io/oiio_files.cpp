@@ -6,6 +6,7 @@
 #include <array>
 #include <mutex>
 #include <stdexcept>
+#include <system_error>
 #include <vector>
 
 #include "dtr/base/error.h"
@@ -33,8 +34,12 @@ std::string OneLine(std::string text) {
 void SetUpOnce() {
   static std::once_flag once;
   std::call_once(once, [] {
-    OIIO::attribute("threads", 1);
     OIIO::attribute("exr_threads", -1);
+    try {
+      OIIO::attribute("threads", 1);
+    } catch (const std::system_error&) {
+      // It starts a thread that it does not use, and the system may have none left.
+    }
   });
 }
 

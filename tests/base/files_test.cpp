@@ -66,6 +66,8 @@ TEST(WriteFileAtomically, PipesAreWrittenAndStay) {
   ASSERT_EQ(mkfifo((folder / "pipe").c_str(), 0600), 0);
   EXPECT_TRUE(IsWrittenInPlace(folder / "pipe"));
   EXPECT_TRUE(IsWrittenInPlace("/dev/null"));
+  EXPECT_TRUE(IsWrittenInPlace("/dev/stdout"));
+  EXPECT_FALSE(IsWrittenInPlace("/dev/shm/nothing")) << "memory that holds files";
   EXPECT_FALSE(IsWrittenInPlace(folder / "nothing"));
   EXPECT_FALSE(IsWrittenInPlace(folder.path()));
   std::string found;

@@ -94,7 +94,7 @@ TEST_F(DepthSettings, NormalsAreUnitVectorsTurnedToTheCamera) {
   EXPECT_GT(known, 0.5 * kCourtyardWidthPx * kCourtyardHeightPx);
   EXPECT_EQ(turned, known);
   ExpectRejected(Dtr({"stereo", Cameras().string(), "-o", (folder_ / "no.dtr").string(), "--engine",
-                      "sgbm", "--normals", folder.string()}),
+                      "sgbm", "--normals", (folder_ / "none").string()}),
                  kWrongUsage, "--normals: expected --engine patchmatch");
 }
 

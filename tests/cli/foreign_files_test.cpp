@@ -161,7 +161,7 @@ TEST_F(ForeignFiles, NothingIsWrittenIntoASet) {
   }
 }
 
-TEST_F(ForeignFiles, InputsAreNotReplaced) {
+TEST_F(ForeignFiles, InputsAreNotReplacedAndOtherFilesOnlyByForce) {
   fs::copy(Photos(), In("photos"), fs::copy_options::recursive);
   fs::copy(Shared("courtyard/cameras.json"), In("cameras.json"));
   const std::string set = Shared("good.dtr"), photos = In("photos"), cameras = In("cameras.json");
@@ -175,6 +175,27 @@ TEST_F(ForeignFiles, InputsAreNotReplaced) {
   ExpectRejected(Dtr({"render", set, "--path", cameras, "-o", In("f"), "--json", cameras}),
                  kWrongUsage, input);
   EXPECT_THAT(DifferingFiles(before, Contents(photos)), IsEmpty());
+
+  const std::string exists = "exists already; choose another";
+  WriteFileAtomically(In("mine.png"), "mine");
+  WriteFileAtomically(In("mine.html"), "mine");
+  WriteFileAtomically(In("mine.json"), "mine");
+  WriteFileAtomically(In("mine.mp4"), "mine");
+  const std::vector<std::string> render{"render", set, "--like", "0001", "--renderer", "cpu", "-o"};
+  const std::vector<std::vector<std::string>> commands{
+      With(render, {In("mine.png")}),
+      {"inspect", set, "-o", In("mine.html")},
+      {"info", set, "--json", In("mine.json")},
+      {"render", set, "--fly-through", "2", "-o", In("mine.mp4")}};
+  for (const auto& words : commands) {
+    ExpectRejected(Dtr(words), kWrongUsage, exists);
+    EXPECT_EQ(Text(words.back()), "mine");
+  }
+  DtrOk(With(commands[0], {"--force"}));
+  EXPECT_NE(Text(In("mine.png")), "mine");
+  // Nothing is lost of an empty file, as mktemp makes it.
+  WriteFileAtomically(In("empty.json"), "");
+  DtrOk({"info", set, "--json", In("empty.json")});
 }
 
 TEST_F(ForeignFiles, FramesAndComparisonsReplaceNoFileOfTheirFolder) {

@@ -90,10 +90,14 @@ TEST_F(LeftOver, ResultsOfCommandsKilledAtEveryRenameAndDeletion) {
   for (const auto& [command, there] : commands) {
     DtrOk(command);
     const auto expected = Contents(work_);
-    bool killed = true;
-    for (int call = 1; killed; ++call) {
+    for (int call = 1;; ++call) {
       for (const auto& entry : fs::directory_iterator(work_)) fs::remove_all(entry.path());
-      killed = DtrWithFailingCalls("DTR_TEST_KILLED_AT", call, command).signal == SIGKILL;
+      const Ran ran = DtrWithFailingCalls("DTR_TEST_KILLED_AT", call, command);
+      if (ran.signal != SIGKILL) {
+        EXPECT_EQ(ran.code, 0) << ran.err;
+        EXPECT_GT(call, 1);
+        break;
+      }
       const Ran again = Dtr(command);
       if (again.code != 0) {
         ASSERT_NE(there, "") << again.err;

@@ -40,6 +40,32 @@ class Limits : public CourtyardAndSet {
   }
 };
 
+TEST_F(Limits, WithoutThreadsItGoesOnWithThoseThereAre) {
+  DTR_REQUIRE_FAILING_CALLS();
+  DtrOk(Build("undisturbed"));
+  const std::vector<std::string> render = {
+      "render", Shared("good.dtr"), "--fly-through", "2", "--renderer", "cpu", "--threads", "8",
+      "-o"};
+  const auto frames = [&](const std::string& name) {
+    std::vector<std::string> words = render;
+    words.push_back(In(name));
+    return words;
+  };
+  DtrOk(frames("undisturbed-frames"));
+  for (const int threads : {0, 1, 3}) {
+    const std::string name = std::to_string(threads);
+    const Ran built = DtrWithFailingCalls("DTR_TEST_THREADS", threads, Build(name));
+    ASSERT_EQ(built.code, 0) << built.err;
+    EXPECT_THAT(DifferingFiles(Contents(folder_ / "undisturbed"), Contents(folder_ / name)),
+                IsEmpty());
+    const Ran drawn = DtrWithFailingCalls("DTR_TEST_THREADS", threads, frames(name + "-frames"));
+    ASSERT_EQ(drawn.code, 0) << drawn.err;
+    EXPECT_THAT(DifferingFiles(Contents(folder_ / "undisturbed-frames"),
+                               Contents(folder_ / (name + "-frames"))),
+                IsEmpty());
+  }
+}
+
 TEST_F(Limits, AFileThatMayNotGrowIsOneLine) {
   constexpr rlim_t kBytes = 20 << 10;
   rlimit before;
@@ -51,7 +77,9 @@ TEST_F(Limits, AFileThatMayNotGrowIsOneLine) {
   const Ran built = DtrByItself(Build("a"));
   ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
   ExpectRejected(exported, kFailed, "File too large");
-  EXPECT_THAT(Contents(folder_ / "a/set.dtr.partial/depth"), IsEmpty());
+  for (const auto& [file, content] : Contents(folder_ / "a")) {
+    EXPECT_EQ(file.find(".tmp"), std::string::npos) << file;
+  }
   ExpectRejected(built, kFailed, "File too large");
   EXPECT_FALSE(fs::exists(In("cloud.ply")));
   DtrOk(Build("a"));
