@@ -106,7 +106,8 @@ TEST_P(DynamicSetBy, ATimeStepOfADynamicSetIsDrawnAsASetOfItsOwn) {
       {"render", Set(), "--renderer", GetParam(), "--like", "0002.jpg", "--play", "-o", In("all")});
   const std::string sets[] = {At("t0.dtr"), At("t0.5.dtr")};
   for (size_t i = 0; i < 2; ++i) {
-    DtrOk({"render", sets[i], "--renderer", GetParam(), "--like", "0002.jpg", "-o", In("one.png")});
+    DtrOk({"render", sets[i], "--renderer", GetParam(), "--like", "0002.jpg", "-o", In("one.png"),
+           "--force"});
     EXPECT_EQ(io::ReadImage(In("one.png")).data(),
               io::ReadImage(In("all") + "/00000" + std::to_string(i) + ".png").data())
         << i;

@@ -61,7 +61,7 @@ class ExportOfDepth : public ::testing::Test {
   }
   fs::path Export(const std::string& name, const std::string& threads) {
     DtrOk({"export", (folder_ / "set.dtr").string(), "-o", (folder_ / name).string(), "--threads",
-           threads, "--json", (folder_ / "result.json").string()});
+           threads, "--json", (folder_ / "result.json").string(), "--force"});
     return folder_ / name;
   }
   TemporaryFolder folder_;

@@ -20,8 +20,8 @@ constexpr size_t kMaxShaderBytes = 1 << 20;
 class OpenGl : public SmallCourtyardSet {
  protected:
   Ran Render(std::vector<std::string> further = {}) {
-    further.insert(further.begin(),
-                   {"render", Set(), "--like", "0001", "-o", In("v.png"), "--size", "60x0"});
+    further.insert(further.begin(), {"render", Set(), "--like", "0001", "-o", In("v.png"), "--size",
+                                     "60x0", "--force"});
     return Dtr(further);
   }
   /// Only a machine without OpenGL has none: every other failure is one.
@@ -151,9 +151,9 @@ TEST_F(OpenGl, AskingForSplatsPicksTheMethodThatHasThem) {
 TEST_F(OpenGl, BenchPrintsATableForPeopleAndOneForPrograms) {
   if (!HasOpenGl()) GTEST_SKIP() << "no OpenGL 4.3";
   for (const char* renderer : {"auto", "gl", "cpu"}) {
-    const Ran ran =
-        DtrOk({"bench", Set(), "--table", "report", "--size", "60x0", "--repeats", "1", "--views",
-               "2,3", "--cameras", "1", "--renderer", renderer, "--json", In("bench.json")});
+    const Ran ran = DtrOk({"bench", Set(), "--table", "report", "--size", "60x0", "--repeats", "1",
+                           "--views", "2,3", "--cameras", "1", "--renderer", renderer, "--json",
+                           In("bench.json"), "--force"});
     EXPECT_THAT(ran.out, HasSubstr("two-pass"));
     EXPECT_THAT(ran.out, HasSubstr("times as fast at 3 views and resolution 1"));
     const Json json = Json::parse(Text(In("bench.json")));

@@ -23,7 +23,7 @@ class InspectBench : public SmallCourtyardSet {
     DtrOk(further);
   }
   Ran Inspect(std::vector<std::string> further = {}) const {
-    further.insert(further.begin(), {"inspect", In("scene.dtr"), "-o", In("page.html")});
+    further.insert(further.begin(), {"inspect", In("scene.dtr"), "-o", In("page.html"), "--force"});
     return Dtr(further);
   }
   std::string Page(std::vector<std::string> further = {}) const {

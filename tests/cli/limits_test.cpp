@@ -56,7 +56,8 @@ TEST_F(Limits, WithoutThreadsItGoesOnWithThoseThereAre) {
     const std::string name = std::to_string(threads);
     const Ran built = DtrWithFailingCalls("DTR_TEST_THREADS", threads, Build(name));
     ASSERT_EQ(built.code, 0) << built.err;
-    EXPECT_THAT(DifferingFiles(Contents(folder_ / "undisturbed"), Contents(folder_ / name)),
+    EXPECT_THAT(DifferingFiles(Contents(folder_ / "undisturbed/set.dtr"),
+                               Contents(folder_ / name / "set.dtr")),
                 IsEmpty());
     const Ran drawn = DtrWithFailingCalls("DTR_TEST_THREADS", threads, frames(name + "-frames"));
     ASSERT_EQ(drawn.code, 0) << drawn.err;
@@ -84,8 +85,9 @@ TEST_F(Limits, AFileThatMayNotGrowIsOneLine) {
   EXPECT_FALSE(fs::exists(In("cloud.ply")));
   DtrOk(Build("a"));
   DtrOk(Build("undisturbed"));
-  EXPECT_THAT(DifferingFiles(Contents(folder_ / "undisturbed"), Contents(folder_ / "a")),
-              IsEmpty());
+  EXPECT_THAT(
+      DifferingFiles(Contents(folder_ / "undisturbed/set.dtr"), Contents(folder_ / "a/set.dtr")),
+      IsEmpty());
 }
 
 TEST_F(Limits, ALostTerminalInterruptsUnlessItIsIgnored) {

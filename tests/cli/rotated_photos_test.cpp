@@ -40,8 +40,9 @@ class RotatedPhotos : public ChessboardSet {
     }
   }
   Json Calibrate(const std::string& folder, std::string* notes = nullptr) {
-    const Ran ran = DtrOk({"calibrate", "board", In(folder), "--board", kChessboard, "--model",
-                           "brown4", "-o", In(folder + "_out/camera.json"), "--json", "-"});
+    const Ran ran =
+        DtrOk({"calibrate", "board", In(folder), "--board", kChessboard, "--model", "brown4", "-o",
+               In(folder + "_out/camera.json"), "--json", "-", "--force"});
     if (notes) *notes = ran.err;
     return Json::parse(ran.out);
   }

@@ -77,7 +77,8 @@ class Ends(WithSet):
                   "work_in_background(lambda: build(progress=show))\n"
                   "while len(calls) < 3: time.sleep(0.01)\n"
                   "import atexit\n"
-                  "atexit.register(lambda: print(time.time(), flush=True))")
+                  # One write, on a line of its own: a thread that ends at work leaves half a line.
+                  "atexit.register(lambda: sys.stdout.write(f'\\n{time.time()}\\n'))")
 
     def test_while_a_callback_sleeps(self):
         self.ends(BUILD + "def sleep(*what):\n"

@@ -38,7 +38,7 @@ TEST_F(Inspect, AViewWhosePhotoIsAnothersComesFirstAmongTheWorst) {
   ASSERT_GE(sources.size(), 4u);
   const std::string spoiled = (*sources[2])["name"];
   const auto first_of_the_worst = [&] {
-    DtrOk({"inspect", In("s.dtr"), "-o", In("page.html")});
+    DtrOk({"inspect", In("s.dtr"), "-o", In("page.html"), "--force"});
     std::string page = Text(In("page.html"));
     page = page.substr(page.find("Worst views"));
     std::string first;
@@ -74,17 +74,17 @@ TEST_F(Inspect, SaysWhatStagesCost) {
   WriteFileAtomically(In("s.dtr/report/run.json"),
                       R"({"stages":[{"name":"depth","wall_s":12.5,"cpu_s":20.25,
                           "peak_rss_kib":1000000},{"name":7}, 8]})");
-  DtrOk({"inspect", In("s.dtr"), "-o", In("page.html")});
+  DtrOk({"inspect", In("s.dtr"), "-o", In("page.html"), "--force"});
   const std::string page = Text(In("page.html"));
   EXPECT_THAT(page, HasSubstr("12.5 s"));
   EXPECT_THAT(page, HasSubstr("1024 MB"));
   WriteFileAtomically(In("s.dtr/report/run.json"), "{\"stages\":[");
-  ExpectRejected(Dtr({"inspect", In("s.dtr"), "-o", In("page.html")}), kFailed,
+  ExpectRejected(Dtr({"inspect", In("s.dtr"), "-o", In("page.html"), "--force"}), kFailed,
                  "run.json: expected JSON, found something else");
 }
 
 TEST_F(Inspect, WhatCannotWorkIsSaidInOneLine) {
-  ExpectRejected(Dtr({"inspect", In("absent.dtr"), "-o", In("page.html")}), kFailed,
+  ExpectRejected(Dtr({"inspect", In("absent.dtr"), "-o", In("page.html"), "--force"}), kFailed,
                  "expected the folder of a D+TR set, found nothing");
   ExpectRejected(Dtr({"inspect", Set(), "-o", In("page.pdf")}), kWrongUsage,
                  "expected a name ending in .html");
