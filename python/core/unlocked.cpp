@@ -108,6 +108,11 @@ void AfterForkInChild() {
 }  // namespace
 
 void WatchEndOfInterpreter() {
+  // Finalizers delete temporary folders. The first one registers all of them with `atexit`, which
+  // calls what came last first: us, so that jobs rest before their folders go.
+  const auto nothing = [] {};
+  py::module_::import("weakref").attr("finalize")(py::cpp_function(nothing),
+                                                  py::cpp_function(nothing));
   py::module_::import("atexit").attr("register")(py::cpp_function(&BeforeTheEnd));
   if (Py_AtExit(&AfterTheEnd) != 0) AfterTheEnd();
   pthread_atfork(&BeforeFork, &AfterForkInParent, &AfterForkInChild);

@@ -119,7 +119,8 @@ class ArraysSet:
         images are whole. Other options of `dtr import` by name: holdout="every:8", memory=8, ...
         Images are stored exactly, depth within 1 part in 65534 of its range of 1/z.
         """
-        with tempfile.TemporaryDirectory(prefix="dtr-") as folder:
+        # At the end of the interpreter a thread may still write into it.
+        with tempfile.TemporaryDirectory(prefix="dtr-", ignore_cleanup_errors=True) as folder:
             arguments = self._write(Path(folder))
             if "depth" in arguments:
                 arguments.update(completion=completion, **self._held_out(options))
