@@ -64,7 +64,7 @@ io::CameraList FromLlff(const std::filesystem::path& file) {
 }
 
 // Cameras of any program, with the size that their file says. A COLMAP model's are as they are.
-io::CameraList ReadCameras(const std::filesystem::path& file) {
+io::CameraList ReadCameras(const std::filesystem::path& file, std::vector<std::string>* notes) {
   const CameraFormat format = FormatOf(file, "", "cameras");
   const std::string kind = format.name;
   if (kind == "cameras-json") return io::ReadCamerasJson(file);
@@ -75,7 +75,7 @@ io::CameraList ReadCameras(const std::filesystem::path& file) {
   if (format.read != nullptr) {
     list = CamerasWithoutPhotos(format.read(file), file.string());
   } else {
-    const calib::SfmModel model = ReadGivenModel(file);
+    const calib::SfmModel model = ReadGivenModel(file, notes);
     for (const calib::SfmImage& image : model.images) {
       io::NamedCamera named;
       named.name = image.name;
@@ -90,7 +90,7 @@ io::CameraList ReadCameras(const std::filesystem::path& file) {
 // A file's poses act on p_world - its origin, the set's on p_world - the set's.
 std::vector<NovelFrame> FromFile(const DtrSet& set, const std::filesystem::path& file,
                                  std::vector<std::string>* notes) {
-  const io::CameraList list = ReadCameras(file);
+  const io::CameraList list = ReadCameras(file, notes);
   const Eigen::Vector3d shift = set.world_origin - list.world_origin;
   std::vector<NovelFrame> cameras;
   const auto distorted = std::count_if(list.cameras.begin(), list.cameras.end(),

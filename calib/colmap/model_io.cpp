@@ -227,12 +227,17 @@ void RejectOtherFiles(const fs::path& folder, const char* extension) {
 
 }  // namespace
 
-calib::SfmModel ReadModel(const fs::path& folder) {
-  if (HasFiles(folder, ".bin")) return Assembled(ReadBinaryModel(folder));
-  if (HasFiles(folder, ".txt")) return Assembled(ReadTextModel(folder));
-  throw Error(folder.string() +
-              ": expected a COLMAP model (cameras, images and points3D, all .bin or all .txt), "
-              "found none; name the folder that holds these files");
+calib::SfmModel ReadModel(const fs::path& folder, std::vector<std::string>* notes) {
+  const bool binary = HasFiles(folder, ".bin");
+  if (!binary && !HasFiles(folder, ".txt")) {
+    throw Error(folder.string() +
+                ": expected a COLMAP model (cameras, images and points3D, all .bin or all .txt), "
+                "found none; name the folder that holds these files");
+  }
+  RawModel raw = binary ? ReadBinaryModel(folder) : ReadTextModel(folder);
+  const std::string line = TakePosesOfFrames(raw);
+  if (notes != nullptr && !line.empty()) notes->push_back(line);
+  return Assembled(std::move(raw));
 }
 
 fs::path ModelFolderIn(const fs::path& folder) {

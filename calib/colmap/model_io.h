@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <string>
+#include <vector>
 
 #include "calib/sfm_model.h"
 
@@ -12,14 +14,17 @@ enum class Format { kBinary, kText };
 
 /// Reads the model in `folder`: cameras, images and points3D, as .bin where all three are there,
 /// else as .txt. COLMAP's frames are ours (x right, y down, z forward; first pixel's centre at
-/// (0.5, 0.5); cam_from_world), so nothing is converted. Rigs and frames, which newer versions
-/// write beside, are not read: the images' poses contain them. Images come back sorted by name.
+/// (0.5, 0.5); cam_from_world), so nothing is converted. Images come back sorted by name. Poses are
+/// those of frames.* and rigs.*, which COLMAP 3.12 and later write, where these are there in the
+/// same format: COLMAP does not read the images' own then. `notes` gets one line where the two
+/// differ.
 ///
 /// Throws Error, naming file and record, on anything that is not a whole and consistent model:
 /// truncation, counts beyond the file's end, values that are not finite, unknown camera models (by
 /// number), duplicate ids or names, a feature of an absent point, an image of an absent camera, a
-/// track that disagrees with the features.
-calib::SfmModel ReadModel(const std::filesystem::path& folder);
+/// track that disagrees with the features, an image of no frame.
+calib::SfmModel ReadModel(const std::filesystem::path& folder,
+                          std::vector<std::string>* notes = nullptr);
 
 /// The folder itself where it holds a model; else the one below it that COLMAP, its dense
 /// workspaces and Gaussian splatting programs use: sparse/0, sparse or 0. Where there is none, or

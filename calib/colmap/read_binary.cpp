@@ -70,6 +70,60 @@ class BinaryReader {
   std::string_view rest_;
 };
 
+Pose TakePose(BinaryReader& in, const std::string& where) {
+  double wxyz[4], translation[3];
+  for (double& value : wxyz) value = in.Take<double>();
+  for (double& value : translation) value = in.Take<double>();
+  return CheckedPose(where, wxyz, translation);
+}
+
+// The type of a sensor: COLMAP knows cameras (0) and inertial units (1).
+bool TakeIsCamera(BinaryReader& in, const std::string& where) {
+  const auto type = in.Take<std::int32_t>();
+  if (type == 0 || type == 1) return type == 0;
+  throw Error(fmt::format("{}: expected a sensor of type 0 or 1, found {}", where, type));
+}
+
+void ReadRigs(RawModel& raw) {
+  BinaryReader in(raw.rigs_file);
+  raw.rigs.resize(in.TakeCount(4 + 4, "rigs"));
+  for (RawRig& rig : raw.rigs) {
+    rig.id = in.Take<std::uint32_t>();
+    const auto where = fmt::format("{}: rig {}", in.file(), rig.id);
+    const auto sensors = in.Take<std::uint32_t>();
+    for (std::uint32_t i = 0; i < sensors; ++i) {
+      RawRig::Sensor& sensor = rig.sensors.emplace_back();
+      sensor.is_camera = TakeIsCamera(in, where);
+      sensor.id = in.Take<std::uint32_t>();
+      if (i == 0) {
+        sensor.sensor_from_rig = Pose();
+      } else if (in.Take<std::uint8_t>() != 0) {
+        sensor.sensor_from_rig = TakePose(in, where);
+      }
+    }
+  }
+  in.ExpectEnd();
+}
+
+void ReadFrames(RawModel& raw) {
+  BinaryReader in(raw.frames_file);
+  raw.frames.resize(in.TakeCount(4 + 4 + 7 * 8 + 4, "frames"));
+  for (RawFrame& frame : raw.frames) {
+    frame.id = in.Take<std::uint32_t>();
+    const auto where = fmt::format("{}: frame {}", in.file(), frame.id);
+    frame.rig_id = in.Take<std::uint32_t>();
+    frame.rig_from_world = TakePose(in, where);
+    const auto data = in.Take<std::uint32_t>();
+    for (std::uint32_t i = 0; i < data; ++i) {
+      RawFrame::Data& of_sensor = frame.data.emplace_back();
+      of_sensor.is_image = TakeIsCamera(in, where);
+      of_sensor.sensor_id = in.Take<std::uint32_t>();
+      of_sensor.id = in.Take<std::uint64_t>();
+    }
+  }
+  in.ExpectEnd();
+}
+
 void ReadCameras(RawModel& raw) {
   BinaryReader in(raw.cameras_file);
   constexpr size_t kHeaderBytes = 4 + 4 + 8 + 8;
@@ -98,10 +152,7 @@ void ReadImages(RawModel& raw) {
   for (calib::SfmImage& image : raw.images) {
     image.id = in.Take<std::uint32_t>();
     const auto where = fmt::format("{}: image {}", in.file(), image.id);
-    double wxyz[4], translation[3];
-    for (double& value : wxyz) value = in.Take<double>();
-    for (double& value : translation) value = in.Take<double>();
-    image.cam_from_world = CheckedPose(where, wxyz, translation);
+    image.cam_from_world = TakePose(in, where);
     image.camera_id = in.Take<std::uint32_t>();
     image.name = in.TakeName();
     image.features.resize(in.TakeCount(kFeatureBytes, "features"));
@@ -146,6 +197,10 @@ RawModel ReadBinaryModel(const std::filesystem::path& folder) {
   raw.cameras_file = folder / "cameras.bin";
   raw.images_file = folder / "images.bin";
   raw.points_file = folder / "points3D.bin";
+  raw.rigs_file = folder / "rigs.bin";
+  raw.frames_file = folder / "frames.bin";
+  if (std::filesystem::exists(raw.rigs_file)) ReadRigs(raw);
+  if (std::filesystem::exists(raw.frames_file)) ReadFrames(raw);
   ReadCameras(raw);
   ReadImages(raw);
   ReadPoints(raw);

@@ -7,12 +7,13 @@
 
 #include "calib/colmap/raw_model.h"
 #include "dtr/base/error.h"
-#include "dtr/base/files.h"
+#include "dtr/base/file_names.h"
+#include "dtr/base/text_file.h"
 
 namespace dtr::colmap {
 namespace {
 
-constexpr std::string_view kBlanks = " \t\r\v\f";
+constexpr std::string_view kBlanks = " \t\v\f";
 
 std::string_view Trimmed(std::string_view text) {
   const size_t first = text.find_first_not_of(kBlanks);
@@ -41,13 +42,15 @@ class Fields {
   template <typename T>
   T Take(const char* what) {
     const std::string_view word = TakeWord(what);
-    T value{};
-    const auto [end, failure] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (failure != std::errc() || end != word.data() + word.size()) {
-      throw Error(fmt::format("{}: expected {}, found '{}'", where_, what, word));
+    if constexpr (std::is_floating_point_v<T>) {
+      if (const auto number = FiniteNumber(word)) return *number;
+    } else {
+      T value{};
+      const auto [end, failure] = std::from_chars(word.data(), word.data() + word.size(), value);
+      if (failure == std::errc() && end == word.data() + word.size()) return value;
     }
-    if constexpr (std::is_floating_point_v<T>) CheckedFinite(where_, value);
-    return value;
+    throw Error(fmt::format("{}: expected {}, found '{}'{}", where_, what,
+                            Printable(std::string(word)), DecimalCommaHint(word)));
   }
 
   std::string_view TakeRest() {
@@ -67,14 +70,7 @@ class Fields {
 class TextReader {
  public:
   explicit TextReader(const std::filesystem::path& file)
-      : file_(file.string()), content_(ReadFile(file, kLargestFile)), rest_(content_) {
-    // Without this a number cut in its middle would pass for a shorter number.
-    if (!content_.empty() && content_.back() != '\n') {
-      throw Error(file_ +
-                  ": expected a line end at the end of the file, found none; the file is "
-                  "cut short (add the line end if it is not)");
-    }
-  }
+      : file_(file.string()), content_(ReadTextFile(file, kLargestFile)), rest_(content_) {}
 
   // The next line that carries a record, or nothing at the end of the file.
   std::optional<Fields> NextRecord() {
@@ -90,15 +86,8 @@ class TextReader {
     return std::nullopt;
   }
 
-  // The line after a record, empty or not.
-  Fields FollowingLine(const char* what) {
-    const auto line = NextRawLine();
-    if (!line) {
-      throw Error(fmt::format("{}: expected a line with {}, found the end; the file is cut short",
-                              Where(), what));
-    }
-    return Fields(Where(), *line);
-  }
+  // The line after a record, empty or not: at the end of the file an empty one may lack its end.
+  Fields FollowingLine() { return Fields(Where(), NextRawLine().value_or("")); }
 
   void ExpectAnnouncedCount() const {
     if (announced_ && *announced_ != records_) {
@@ -114,7 +103,7 @@ class TextReader {
 
   std::optional<std::string_view> NextRawLine() {
     if (rest_.empty()) return std::nullopt;
-    const size_t end = rest_.find('\n');  // there is one: the constructor saw the last
+    const size_t end = rest_.find('\n');  // there is one: TextOf ends the last line, too
     const std::string_view line = rest_.substr(0, end);
     rest_.remove_prefix(end + 1);
     ++line_;
@@ -153,18 +142,77 @@ std::uint64_t TakePointId(Fields& line) {
   return id;
 }
 
+Pose TakePose(Fields& line) {
+  double wxyz[4], translation[3];
+  for (double& value : wxyz) value = line.Take<double>("a rotation (qw qx qy qz)");
+  for (double& value : translation) value = line.Take<double>("a translation (tx ty tz)");
+  return CheckedPose(line.where(), wxyz, translation);
+}
+
+bool TakeIsCamera(Fields& line) {
+  const std::string_view type = line.TakeWord("a type of sensor");
+  if (type == "CAMERA" || type == "IMU") return type == "CAMERA";
+  throw Error(fmt::format("{}: expected a sensor CAMERA or IMU, found '{}'", line.where(),
+                          Printable(std::string(type))));
+}
+
+void ExpectLineEnd(Fields& line) {
+  if (line.AtEnd()) return;
+  throw Error(fmt::format("{}: expected the end of the line, found '{}'", line.where(),
+                          Printable(std::string(line.TakeRest()))));
+}
+
+void ReadRigsText(RawModel& raw) {
+  TextReader in(raw.rigs_file);
+  while (auto line = in.NextRecord()) {
+    RawRig rig;
+    rig.id = line->Take<std::uint32_t>("a rig id");
+    const auto sensors = line->Take<std::uint32_t>("a number of sensors");
+    for (std::uint32_t i = 0; i < sensors; ++i) {
+      RawRig::Sensor& sensor = rig.sensors.emplace_back();
+      sensor.is_camera = TakeIsCamera(*line);
+      sensor.id = line->Take<std::uint32_t>("a sensor id");
+      if (i == 0) {
+        sensor.sensor_from_rig = Pose();
+      } else if (line->Take<int>("1 where a pose follows, else 0") == 1) {
+        sensor.sensor_from_rig = TakePose(*line);
+      }
+    }
+    ExpectLineEnd(*line);
+    raw.rigs.push_back(std::move(rig));
+  }
+  in.ExpectAnnouncedCount();
+}
+
+void ReadFramesText(RawModel& raw) {
+  TextReader in(raw.frames_file);
+  while (auto line = in.NextRecord()) {
+    RawFrame frame;
+    frame.id = line->Take<std::uint32_t>("a frame id");
+    frame.rig_id = line->Take<std::uint32_t>("a rig id");
+    frame.rig_from_world = TakePose(*line);
+    const auto data = line->Take<std::uint32_t>("a number of images");
+    for (std::uint32_t i = 0; i < data; ++i) {
+      RawFrame::Data& of_sensor = frame.data.emplace_back();
+      of_sensor.is_image = TakeIsCamera(*line);
+      of_sensor.sensor_id = line->Take<std::uint32_t>("a sensor id");
+      of_sensor.id = line->Take<std::uint64_t>("an image id");
+    }
+    ExpectLineEnd(*line);
+    raw.frames.push_back(std::move(frame));
+  }
+  in.ExpectAnnouncedCount();
+}
+
 void ReadImagesText(RawModel& raw) {
   TextReader in(raw.images_file);
   while (auto line = in.NextRecord()) {
     calib::SfmImage image;
     image.id = line->Take<std::uint32_t>("an image id");
-    double wxyz[4], translation[3];
-    for (double& value : wxyz) value = line->Take<double>("a rotation (qw qx qy qz)");
-    for (double& value : translation) value = line->Take<double>("a translation (tx ty tz)");
-    image.cam_from_world = CheckedPose(line->where(), wxyz, translation);
+    image.cam_from_world = TakePose(*line);
     image.camera_id = line->Take<std::uint32_t>("a camera id");
     image.name = line->TakeRest();  // a name may contain spaces
-    Fields features = in.FollowingLine("the image's features");
+    Fields features = in.FollowingLine();
     while (!features.AtEnd()) {
       calib::SfmFeature feature;
       feature.pixel.x() = features.Take<double>("x");
@@ -234,6 +282,10 @@ RawModel ReadTextModel(const std::filesystem::path& folder) {
   raw.cameras_file = folder / "cameras.txt";
   raw.images_file = folder / "images.txt";
   raw.points_file = folder / "points3D.txt";
+  raw.rigs_file = folder / "rigs.txt";
+  raw.frames_file = folder / "frames.txt";
+  if (std::filesystem::exists(raw.rigs_file)) ReadRigsText(raw);
+  if (std::filesystem::exists(raw.frames_file)) ReadFramesText(raw);
   raw.cameras = ReadTextCameras(raw.cameras_file);
   ReadImagesText(raw);
   ReadPointsText(raw);

@@ -12,6 +12,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/json_number.h"
+#include "dtr/base/text_file.h"
 #include "dtr/io/json_fields.h"
 
 namespace dtr::calib {
@@ -306,7 +307,7 @@ void WriteCalibration(const std::filesystem::path& file, const Calibration& cali
 
 Calibration ReadCalibration(const std::filesystem::path& file) {
   const std::string where = file.string();
-  const Json json = io::ParseJson(ReadFile(file, kLargestCalibrationBytes), where);
+  const Json json = io::ParseJson(ReadTextFile(file, kLargestCalibrationBytes), where);
   const JsonObject root(json, where, "");
   if (root.String("format") != kFormat) root.Fail("format", fmt::format("\"{}\"", kFormat));
   if (root.PositiveInt("version") != kVersion) root.Fail("version", fmt::format("{}", kVersion));

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <charconv>
 #include <cmath>
 #include <optional>
 #include <string_view>
@@ -13,22 +12,14 @@
 #include "calib/files/camera_fields.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/base/text_file.h"
 
 namespace dtr::calib {
 namespace {
 
 constexpr std::uintmax_t kLargestFileBytes = 16u << 20;  // OpenCV's samples write the points too
 
-std::optional<double> NumberFrom(std::string_view word) {
-  word = Trimmed(word);
-  if (!word.empty() && word[0] == '+') word.remove_prefix(1);
-  double value = 0;
-  const auto [end, failure] = std::from_chars(word.data(), word.data() + word.size(), value);
-  // "3." is how FileStorage writes whole numbers; from_chars takes it.
-  if (failure != std::errc() || end != word.data() + word.size() || !std::isfinite(value))
-    return {};
-  return value;
-}
+std::optional<double> NumberFrom(std::string_view word) { return FiniteNumber(Trimmed(word)); }
 
 // The numbers of a matrix's "data: [ ... ]", or of a list.
 std::vector<double> MatrixData(const Field& field, const std::string& where) {
@@ -191,7 +182,7 @@ std::string MatricesOf(const LensCamera& camera, const char* k_name, const char*
 
 LensCamera ReadOpenCvYaml(const std::filesystem::path& file) {
   const std::string where = file.string();
-  const CameraFields fields(ReadFile(file, kLargestFileBytes), where);
+  const CameraFields fields(ReadTextFile(file, kLargestFileBytes), where);
   LensCamera camera;
   // The matrices first: what has none is another program's file, and its name is worth more.
   const Field& matrix = fields.Get(FieldRole::kMatrix);

@@ -5,7 +5,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -15,7 +14,7 @@
 #include "calib/files/camera_fields.h"
 #include "calib/files/opencv_yaml.h"
 #include "dtr/base/error.h"
-#include "dtr/base/files.h"
+#include "dtr/base/text_file.h"
 
 namespace dtr::calib {
 namespace {
@@ -27,10 +26,7 @@ constexpr double kRigRotationTolerance = 1e-3;          // printed digits
 std::vector<double> NumbersOf(std::string text, const std::string& where) {
   std::replace_if(
       text.begin(), text.end(),
-      [](char c) {
-        return c == '[' || c == ']' || c == ',' || c == '\n' || c == '\r' || c == '\t';
-      },
-      ' ');
+      [](char c) { return c == '[' || c == ']' || c == ',' || c == '\n' || c == '\t'; }, ' ');
   std::vector<double> numbers;
   for (size_t at = text.find_first_not_of(' '); at != std::string::npos;
        at = text.find_first_not_of(' ', at)) {
@@ -38,13 +34,11 @@ std::vector<double> NumbersOf(std::string text, const std::string& where) {
     const std::string word = text.substr(at, end - at);
     at = end;
     if (word == "-") continue;  // of a block list
-    const char* begin = word.data() + (word[0] == '+' ? 1 : 0);
-    double number = 0;
-    const auto [last, failure] = std::from_chars(begin, word.data() + word.size(), number);
-    if (failure != std::errc() || last != word.data() + word.size() || !std::isfinite(number)) {
+    const auto number = FiniteNumber(word);
+    if (!number) {
       throw Error(fmt::format("{}: expected finite numbers, found '{}'", where, Shown(word)));
     }
-    numbers.push_back(number);
+    numbers.push_back(*number);
   }
   return numbers;
 }
@@ -431,7 +425,7 @@ CameraFile MrcalModel(const std::string& content, const std::string& source) {
 
 CameraFile ReadCamerasOf(const std::filesystem::path& file) {
   const std::string source = file.string();
-  const std::string content = ReadFile(file, kMaxRigFileBytes);
+  const std::string content = ReadTextFile(file, kMaxRigFileBytes);
   if (content.find("lensmodel") != std::string::npos) return MrcalModel(content, source);
   const CameraFields fields(content, source);
   const Field* first = fields.Named("cam0");

@@ -66,7 +66,9 @@ int RunRefine(const CalibrateRefineArguments& options, const Context& context) {
   colmap::RequireNoModel(options.output);
   const pipeline::MetreOptions metres = MetreOptionsFrom(!options.gps.empty(), options.metres);
   const std::filesystem::path model_folder = colmap::ModelFolderIn(options.model);
-  const calib::SfmModel model = colmap::ReadModel(model_folder);
+  std::vector<std::string> notes;
+  const calib::SfmModel model = colmap::ReadModel(model_folder, &notes);
+  for (const std::string& note : notes) context.console.Note(note);
   calib::RefineOptions refine;
   refine.separate_lenses = options.separate;
   refine.covariance = options.covariance;

@@ -56,7 +56,7 @@ void AddImportCommand(CLI::App& app) {
         auto options = std::make_shared<pipeline::ImportRequest>();
         auto depth_kind = std::make_shared<std::string>();
         command
-            .add_option("--cameras", options->cameras,
+            .add_option("cameras,--cameras", options->cameras,
                         "A file or folder of cameras, of any program that --format names")
             ->required()
             ->type_name("FILE");

@@ -9,6 +9,7 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 TEST_F(FieldScene, DepthMapsThatNobodyAskedForAreNamed) {
   DtrOk({"import", "--cameras", Field("_scene/transforms_dfull.json").string(), "--images",
@@ -58,6 +59,38 @@ TEST_F(FieldScene, ColmapReadsWhatIsExported) {
   DtrOk({"import", "--cameras", (folder_ / "text").string(), "--images",
          (folder_ / "out/images").string(), "-o", again});
   EXPECT_EQ(io::ReadSet(again).frames[0].views.size(), 6u);
+}
+
+// What COLMAP writes for other programs says the same as its model.
+TEST_F(FieldScene, NvmAndBundlerFilesOfColmapGiveTheCamerasOfItsModel) {
+  const std::string images = Field("_scene/images").string();
+  const auto imported = [&](const fs::path& cameras) {
+    DtrOk({"import", "--cameras", cameras.string(), "--images", images, "--force", "-o", Set(),
+           "--json", (folder_ / "result.json").string()});
+    EXPECT_THAT(Notes(), Not(HasSubstr("matched features lie")));
+    return io::ReadSet(Set());
+  };
+  const DtrSet truth = imported(Field("_scene/c_plain"));
+  const std::pair<const char*, const char*> kinds[] = {{"NVM", "scene.nvm"},
+                                                       {"Bundler", "scene.bundle.out"}};
+  for (const auto& [kind, file] : kinds) {
+    const fs::path output = folder_ / (std::string(kind) == "NVM" ? "scene.nvm" : "scene");
+    ASSERT_TRUE(
+        RunProcess({"colmap", "model_converter", "--input_path", Field("_scene/c_plain").string(),
+                    "--output_path", output.string(), "--output_type", kind},
+                   {})
+            .Ok());
+    const DtrSet set = imported(folder_ / file);
+    ASSERT_EQ(set.frames[0].views.size(), truth.frames[0].views.size());
+    for (size_t i = 0; i < truth.frames[0].views.size(); ++i) {
+      const View &view = set.frames[0].views[i], &expected = truth.frames[0].views[i];
+      EXPECT_NEAR(view.camera.fx_px(), expected.camera.fx_px(), 1e-9);
+      EXPECT_LT(view.cam_from_world.rotation.angularDistance(expected.cam_from_world.rotation),
+                1e-9);
+      EXPECT_LT((view.cam_from_world.translation - expected.cam_from_world.translation).norm(),
+                1e-9);
+    }
+  }
 }
 
 }  // namespace

@@ -45,6 +45,30 @@ Reader OpenPointsTxt(const fs::path& folder) {
   return OpenModel(folder, colmap::Format::kText, "points3D");
 }
 
+Reader OpenRigs(const fs::path& folder, colmap::Format format, const std::string& part) {
+  const bool binary = format == colmap::Format::kBinary;
+  const calib::SfmModel model = colmap::testing::ModelWithEveryCamera(7);
+  const auto files = colmap::testing::TrivialFrames(model, binary);
+  const char* extension = binary ? ".bin" : ".txt";
+  colmap::WriteModel(folder, model, format);
+  WriteFileAtomically(folder / (std::string("rigs") + extension), files.rigs);
+  WriteFileAtomically(folder / (std::string("frames") + extension), files.frames);
+  const fs::path file = folder / (part + extension);
+  return {file, {ReadFile(file, kSeedLimitBytes)}, [=] { colmap::ReadModel(folder); }};
+}
+Reader OpenRigsBin(const fs::path& folder) {
+  return OpenRigs(folder, colmap::Format::kBinary, "rigs");
+}
+Reader OpenFramesBin(const fs::path& folder) {
+  return OpenRigs(folder, colmap::Format::kBinary, "frames");
+}
+Reader OpenRigsTxt(const fs::path& folder) {
+  return OpenRigs(folder, colmap::Format::kText, "rigs");
+}
+Reader OpenFramesTxt(const fs::path& folder) {
+  return OpenRigs(folder, colmap::Format::kText, "frames");
+}
+
 Reader OpenDenseDepth(const fs::path& folder) {
   const fs::path file = folder / "a.jpg.geometric.bin";
   const std::vector<float> values{1, 2, 3, 0, 5, -1, 7, 8, 9, 10, 11, 12};
@@ -79,6 +103,8 @@ constexpr ReaderKind kReaders[] = {
     {"colmap-cameras-bin", OpenCamerasBin}, {"colmap-images-bin", OpenImagesBin},
     {"colmap-points-bin", OpenPointsBin},   {"colmap-cameras-txt", OpenCamerasTxt},
     {"colmap-images-txt", OpenImagesTxt},   {"colmap-points-txt", OpenPointsTxt},
+    {"colmap-rigs-bin", OpenRigsBin},       {"colmap-frames-bin", OpenFramesBin},
+    {"colmap-rigs-txt", OpenRigsTxt},       {"colmap-frames-txt", OpenFramesTxt},
     {"colmap-depth", OpenDenseDepth},       {"colmap-database", OpenDatabase},
 };
 

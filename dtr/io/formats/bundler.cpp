@@ -4,7 +4,8 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/file_names.h"
-#include "dtr/base/files.h"
+#include "dtr/base/text_file.h"
+#include "dtr/base/text_rows.h"
 #include "dtr/io/formats/foreign_readers.h"
 #include "dtr/io/formats/pose_from_matrix.h"
 #include "dtr/io/formats/scene_text.h"
@@ -17,32 +18,38 @@ namespace fs = std::filesystem;
 
 constexpr std::uintmax_t kMaxBundlerListBytes = 64u << 20;
 
-// The names of the images, which bundle.out only counts: the first word of each line of the list.
+// A name a line, or "name 0 focal" as Bundler has it: names may hold blanks, the two numbers behind
+// them do not.
+std::vector<std::string> NamesInList(const fs::path& list) {
+  TextRows rows(ReadTextFile(list, kMaxBundlerListBytes), list.string());
+  std::vector<std::string> names;
+  for (std::string_view line; rows.NextLine(line);) {
+    const auto trim = [&] {
+      while (!line.empty() && internal::IsBlank(line.back())) line.remove_suffix(1);
+      while (!line.empty() && internal::IsBlank(line.front())) line.remove_prefix(1);
+    };
+    trim();
+    if (line.empty()) continue;
+    const std::vector<std::string> words = CellsOf(line, ' ');
+    const bool has_focal =
+        words.size() >= 3 && words[words.size() - 2] == "0" && FiniteNumber(words.back());
+    for (int i = 0; has_focal && i < 2; ++i) {
+      line = line.substr(0, line.find_last_of(" \t"));
+      trim();
+    }
+    names.emplace_back(line);
+  }
+  return names;
+}
+
+// The names of the images, which bundle.out only counts. COLMAP calls the two NAME.bundle.out and
+// NAME.list.txt.
 std::vector<std::string> ImageNames(const fs::path& file, size_t count) {
-  fs::path stem = file;
-  stem.replace_extension();
-  const std::vector<fs::path> candidates = {
-      file.string() + ".list.txt", stem.string() + ".list.txt", file.parent_path() / "list.txt",
-      file.parent_path() / ".." / "list.txt", file.parent_path() / "image_list.txt"};
   std::string looked_for;
-  for (const fs::path& list : candidates) {
+  for (const fs::path& list : BundlerLists(file)) {
     looked_for += (looked_for.empty() ? "" : ", ") + list.lexically_normal().string();
     if (!fs::is_regular_file(list)) continue;
-    const std::string text = ReadFile(list, kMaxBundlerListBytes);
-    std::vector<std::string> names;
-    for (size_t at = 0; at < text.size();) {
-      const size_t end = std::min(text.find('\n', at), text.size());
-      std::string line = text.substr(at, end - at);
-      at = end + 1;
-      while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.pop_back();
-      if (line.empty()) continue;
-      // "name 0 focal": names may hold blanks, the two numbers behind them do not.
-      const size_t focal = line.rfind(' ');
-      if (focal != std::string::npos && focal >= 2 && line.compare(focal - 2, 2, " 0") == 0) {
-        line.erase(focal - 2);
-      }
-      names.push_back(line);
-    }
+    const std::vector<std::string> names = NamesInList(list);
     if (names.size() == count) return names;
     throw Error(fmt::format("{}: expected the names of {} images as {} has, found {}",
                             list.lexically_normal().string(), count, file.string(), names.size()));
@@ -99,6 +106,19 @@ void ReadBundlerPoint(SceneText& text, const std::vector<std::optional<size_t>>&
 
 }  // namespace
 
+std::vector<fs::path> BundlerLists(const fs::path& file) {
+  const fs::path stem = fs::path(file).replace_extension(), folder = file.parent_path();
+  std::vector<fs::path> lists = {file.string() + ".list.txt", stem.string() + ".list.txt"};
+  if (stem.extension() == ".bundle") {
+    lists.push_back(fs::path(stem).replace_extension().string() + ".list.txt");
+  }
+  for (const fs::path& name :
+       {fs::path("list.txt"), fs::path("..") / "list.txt", fs::path("image_list.txt")}) {
+    lists.push_back(folder / name);
+  }
+  return lists;
+}
+
 ForeignScene ReadBundlerOut(const fs::path& file) {
   SceneText text(file);
   if (!text.Line().starts_with("# Bundle file v0.3")) {
@@ -110,6 +130,7 @@ ForeignScene ReadBundlerOut(const fs::path& file) {
   const int points = text.Int("the number of points", 0, SceneText::kMaxCount);
   const std::vector<std::string> names = ImageNames(file, static_cast<size_t>(cameras));
   ForeignScene scene;
+  scene.conventions_of = "Bundler";
   std::vector<std::optional<size_t>> index_of;
   for (size_t i = 0; i < names.size(); ++i) ReadBundlerCamera(text, names[i], i, scene, index_of);
   for (int i = 0; i < points; ++i) ReadBundlerPoint(text, index_of, scene);

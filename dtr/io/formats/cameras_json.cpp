@@ -11,6 +11,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/file_names.h"
 #include "dtr/base/files.h"
+#include "dtr/base/text_file.h"
 #include "dtr/io/formats/json_fields.h"
 #include "dtr/io/formats/plausible_intrinsics.h"
 #include "dtr/io/formats/pose_from_matrix.h"
@@ -111,7 +112,7 @@ CameraList ParseCamerasJson(std::string_view text, const std::string& source) {
 }
 
 CameraList ReadCamerasJson(const std::filesystem::path& file) {
-  return ParseCamerasJson(ReadFile(file, kMaxListBytes), file.string());
+  return ParseCamerasJson(ReadTextFile(file, kMaxListBytes), file.string());
 }
 
 std::string FormatCamerasJson(const CameraList& list) {

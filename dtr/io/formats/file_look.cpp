@@ -5,11 +5,13 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/regular_file.h"
+#include "dtr/base/text_file.h"
 
 namespace dtr::io {
 namespace {
 
 constexpr std::streamsize kHeadBytes = 64 << 10;
+constexpr std::uintmax_t kMaxJsonBytes = 1u << 30;
 
 // Collects the names of the fields of the object that begins at `depth_`.
 class KeyCollector : public nlohmann::json_sax<nlohmann::json> {
@@ -66,16 +68,14 @@ FileLook LookAt(const std::filesystem::path& file) {
   in.read(look.head.data(), kHeadBytes);
   if (in.bad()) throw Error(file.string() + ": cannot be read");
   look.head.resize(static_cast<size_t>(in.gcount()));
-  if (look.head.starts_with("\xef\xbb\xbf")) look.head.erase(0, 3);
+  look.head = TextOfHead(std::move(look.head));
   const size_t first = look.head.find_first_not_of(" \t\r\n");
   if (first == std::string::npos) return look;
   look.is_json_list = look.head[first] == '[';
   look.is_json = look.is_json_list || look.head[first] == '{';
   if (!look.is_json) return look;
-  in.clear();
-  in.seekg(0);
   KeyCollector collector(look.keys, look.is_json_list ? 2 : 1);
-  nlohmann::json::sax_parse(in, &collector);
+  nlohmann::json::sax_parse(ReadTextFile(file, kMaxJsonBytes), &collector);
   look.is_broken = collector.is_broken();
   return look;
 }

@@ -35,7 +35,9 @@ Confidence ReadConfidence(const fs::path& file) {
 
 fs::path ConfidenceMaps::FileOf(const fs::path& depth_file) const {
   if (folder.empty()) return {};
-  const fs::path file = folder / depth_file.filename().replace_extension(extension);
+  std::string name = depth_file.filename().replace_extension(extension).string();
+  if (name.starts_with(prefix.first)) name.replace(0, prefix.first.size(), prefix.second);
+  const fs::path file = folder / name;
   std::error_code ignored;
   return fs::is_regular_file(file, ignored) ? file : fs::path();
 }

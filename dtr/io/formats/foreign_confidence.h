@@ -2,6 +2,7 @@
 #pragma once
 #include <filesystem>
 #include <string>
+#include <utility>
 
 #include "dtr/types/depth_image.h"
 
@@ -14,6 +15,9 @@ struct ConfidenceMaps {
   /// Their files are called as the depth maps, with this: ".png" (8 bits), or ".conf" (Record3D's:
   /// LZFSE of bytes).
   std::string extension;
+  /// Where the names of depth maps begin with the first, those of the confidence maps begin with
+  /// the second.
+  std::pair<std::string, std::string> prefix = {};
 
   /// The map of a depth map of this name; empty: there is none.
   std::filesystem::path FileOf(const std::filesystem::path& depth_file) const;

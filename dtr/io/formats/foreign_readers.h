@@ -25,9 +25,11 @@ ForeignScene ReadRealityScanCsv(const std::filesystem::path& file);
 /// Source: opensfm.org/docs, "Geometric models".
 ForeignScene ReadOpenSfmJson(const std::filesystem::path& file);
 
-/// Bundler v0.3, bundle.out, with the list of its images beside (FILE.list.txt, list.txt).
+/// Bundler v0.3, bundle.out, with the list of its images beside (one of BundlerLists).
 /// Source: Bundler's manual, "Output format and scene representation".
 ForeignScene ReadBundlerOut(const std::filesystem::path& file);
+/// Where the list of the images of a bundle.out may lie, likeliest first.
+std::vector<std::filesystem::path> BundlerLists(const std::filesystem::path& file);
 
 /// VisualSFM, .nvm (NVM_V3): the first model. Source: VisualSFM's documentation, "NVM".
 ForeignScene ReadNvm(const std::filesystem::path& file);

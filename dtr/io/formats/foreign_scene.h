@@ -58,11 +58,14 @@ struct ForeignPoint {
 
 /// What a file holds.
 struct ForeignScene {
-  LengthUnit unit = LengthUnit::kArbitrary;
+  LengthUnit unit = LengthUnit::kUnknown;
   Eigen::Vector3d world_origin = Eigen::Vector3d::Zero();  ///< poses act on p_world - world_origin
   PhotoGrid photo_grid = PhotoGrid::kStored;
   std::vector<ForeignCamera> cameras;
   std::vector<ForeignPoint> points;
+  /// The program of this format where others write it in ways of their own: the points decide in
+  /// which (pipeline/detail/cameras/point_conventions.h). Empty: the format has one meaning.
+  std::string conventions_of;
   /// Photos that have no camera, and why: disabled, not aligned, ...
   std::vector<std::pair<std::string, std::string>> left_out;
   std::vector<std::string> notes;  ///< one line each: what the file holds and is not used

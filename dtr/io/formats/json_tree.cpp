@@ -7,7 +7,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/file_names.h"
-#include "dtr/base/files.h"
+#include "dtr/base/text_file.h"
 #include "dtr/io/formats/cameras_json.h"
 
 namespace dtr::io::internal {
@@ -23,7 +23,7 @@ std::string Shown(const Tree& value) {
 
 Tree ReadTree(const std::filesystem::path& file) {
   try {
-    return Tree::parse(ReadFile(file, kMaxSceneBytes));
+    return Tree::parse(ReadTextFile(file, kMaxSceneBytes));
   } catch (const nlohmann::json::exception& e) {
     throw Error(file.string() + ": expected JSON, found " + e.what());
   }
@@ -52,9 +52,7 @@ double NumberFrom(const Tree& value, const std::string& where) {
   if (value.is_number()) {
     number = value.get<double>();
   } else if (value.is_string()) {
-    const auto& text = value.get_ref<const std::string&>();
-    const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), number);
-    if (failure != std::errc() || end != text.data() + text.size()) number = NAN;
+    number = FiniteNumber(value.get_ref<const std::string&>()).value_or(NAN);
   }
   if (std::isfinite(number)) return number;
   throw Error(fmt::format("{}: expected a finite number, found {}", where, Shown(value)));

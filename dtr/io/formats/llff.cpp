@@ -48,7 +48,7 @@ LlffCameras ReadLlff(const std::filesystem::path& poses_bounds, std::vector<Size
   std::sort(images.begin(), images.end(),
             [](const SizedImage& a, const SizedImage& b) { return a.name < b.name; });
   LlffCameras cameras;
-  cameras.list.unit = LengthUnit::kArbitrary;
+  cameras.list.unit = LengthUnit::kUnknown;
   cameras.list.photo_grid = PhotoGrid::kStored;  // COLMAP's, from which LLFF makes the file
   for (size_t i = 0; i < images.size(); ++i) {
     const double* row = array.values.data() + i * kRowNumbers;

@@ -10,6 +10,8 @@
 #include "dtr/base/error.h"
 #include "dtr/base/file_names.h"
 #include "dtr/base/files.h"
+#include "dtr/base/lower_case.h"
+#include "dtr/base/text_file.h"
 #include "dtr/io/formats/foreign_readers.h"
 #include "dtr/io/formats/pose_from_matrix.h"
 
@@ -27,14 +29,12 @@ std::vector<double> NumbersIn(const Node& node, size_t count, const std::string&
   for (size_t at = text.find_first_not_of(" \t\r\n"); at < text.size();
        at = text.find_first_not_of(" \t\r\n", at)) {
     const size_t end = std::min(text.find_first_of(" \t\r\n", at), text.size());
-    double number = 0;
-    const auto [last, failure] = std::from_chars(text.data() + at, text.data() + end, number);
-    if (failure != std::errc() || last != text.data() + end || !std::isfinite(number) ||
-        numbers.size() == count) {
+    const auto number = FiniteNumber(std::string_view(text).substr(at, end - at));
+    if (!number || numbers.size() == count) {
       numbers.clear();
       break;
     }
-    numbers.push_back(number);
+    numbers.push_back(*number);
     at = end;
   }
   if (numbers.size() == count) return numbers;
@@ -210,6 +210,22 @@ Pose MetashapePose(const Node& camera, const std::vector<Similarity>& transforms
   return PoseFromCenter(world_from_cam, centre, kPrintedRotationTolerance, where);
 }
 
+// The unit of what the transform of a reference leads to: that of a local or projected system (WKT)
+// that counts in metres, else geocentric metres, an earth radius from the origin, which every
+// system of the earth has. Metashape writes WGS 84 for chunks without a reference, too.
+LengthUnit UnitOf(const Node& chunk, const std::vector<ForeignCamera>& cameras) {
+  constexpr double kLeastRadius_m = 6.3e6, kMostRadius_m = 6.5e6;
+  const std::string system = LowerCase(chunk.child("reference").text().get());
+  for (const char* metre : {"unit[\"metre", "unit[\"meter"}) {
+    if (system.find(metre) != std::string::npos) return LengthUnit::kMetre;
+  }
+  const double radius = cameras.front().cam_from_world.TargetOriginInSource().norm();
+  const bool is_local =
+      system.find("local_cs") != std::string::npos || system.find("engcrs") != std::string::npos;
+  const bool is_on_earth = radius > kLeastRadius_m && radius < kMostRadius_m;
+  return !system.empty() && !is_local && is_on_earth ? LengthUnit::kMetre : LengthUnit::kUnknown;
+}
+
 Node ChunkOf(const pugi::xml_document& document, const std::string& source, ForeignScene& scene) {
   const Node root = document.child("document");
   const Node chunk = root.child("chunk");
@@ -245,11 +261,6 @@ ForeignScene ReadMetashapeXml(const std::filesystem::path& file) {
   const std::string component_id = LargestComponent(cameras);
   const Node component = NodeById(chunk.child("components"), "component", component_id);
   const std::vector<Similarity> transforms = Transforms(chunk, component, source);
-  // Only references give a transform: to a coordinate system of the earth, or in its unit.
-  if (!transforms.empty() &&
-      std::string(chunk.child("reference").text().get()).find("etre") != std::string::npos) {
-    scene.unit = LengthUnit::kMetre;
-  }
   std::map<std::string, ForeignIntrinsics> intrinsics_of;
   for (const Node& camera : cameras) {
     const std::string label = Attribute(camera, "label");
@@ -277,6 +288,7 @@ ForeignScene ReadMetashapeXml(const std::filesystem::path& file) {
     throw Error(source + ": expected at least one aligned camera, found none" +
                 (scene.left_out.empty() ? "" : "; the first is " + scene.left_out.front().second));
   }
+  if (!transforms.empty()) scene.unit = UnitOf(chunk, scene.cameras);
   return scene;
 }
 

@@ -84,7 +84,9 @@ ForeignScene ReadMivJson(const std::filesystem::path& file) {
   const std::set<std::string> sources = SourceNames(root, source);
   ForeignScene scene;
   const Tree* metres = Find(root, "lengthsInMeters");
-  scene.unit = metres != nullptr && *metres == true ? LengthUnit::kMetre : LengthUnit::kArbitrary;
+  if (metres != nullptr && metres->is_boolean()) {
+    scene.unit = metres->get<bool>() ? LengthUnit::kMetre : LengthUnit::kArbitrary;
+  }
   if (const Tree* facts = Find(root, "dtr")) {
     ReadWorldFacts(*facts, source + ": dtr", scene);
   }

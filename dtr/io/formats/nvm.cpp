@@ -2,11 +2,10 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 
 #include "dtr/base/error.h"
 #include "dtr/base/file_names.h"
+#include "dtr/base/text_file.h"
 #include "dtr/io/formats/foreign_readers.h"
 #include "dtr/io/formats/pose_from_matrix.h"
 #include "dtr/io/formats/scene_text.h"
@@ -42,12 +41,12 @@ std::vector<double> NumbersAtEnd(std::string_view& line, size_t count, const std
     const size_t begin = line.find_last_of(" \t");
     const std::string_view word =
         begin == std::string_view::npos ? std::string_view() : line.substr(begin + 1);
-    const auto [end, failure] = std::from_chars(word.data(), word.data() + word.size(), numbers[i]);
-    if (word.empty() || failure != std::errc() || end != word.data() + word.size() ||
-        !std::isfinite(numbers[i])) {
-      throw Error(fmt::format("{}expected a name and {} numbers, found '{}'", where, count,
-                              Printable(std::string(line.substr(0, 60)))));
+    const auto number = FiniteNumber(word);
+    if (!number) {
+      throw Error(fmt::format("{}expected a name and {} numbers, found '{}'{}", where, count,
+                              Printable(std::string(line.substr(0, 60))), DecimalCommaHint(word)));
     }
+    numbers[i] = *number;
     line.remove_suffix(word.size());
   }
   while (!line.empty() && internal::IsBlank(line.back())) line.remove_suffix(1);
@@ -114,6 +113,7 @@ ForeignScene ReadNvm(const std::filesystem::path& file) {
   const int cameras = text.Int("the number of cameras", 1, SceneText::kMaxCount);
   text.Line();
   ForeignScene scene;
+  scene.conventions_of = "VisualSFM";
   for (int i = 0; i < cameras; ++i) {
     if (text.AtEnd()) {
       throw Error(fmt::format("{}: expected {} cameras, found {}; the file is cut short",

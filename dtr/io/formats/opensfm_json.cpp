@@ -1,14 +1,13 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
-#include <charconv>
 #include <map>
 #include <set>
-#include <sstream>
 
 #include "dtr/base/error.h"
 #include "dtr/base/file_names.h"
-#include "dtr/base/files.h"
+#include "dtr/base/text_file.h"
+#include "dtr/base/text_rows.h"
 #include "dtr/io/formats/foreign_readers.h"
 #include "dtr/io/formats/json_tree.h"
 
@@ -109,45 +108,21 @@ Pose OpenSfmShotPose(const Tree& scene, const std::string& name, const Tree& sho
   throw Error(where + ": expected a rotation and a translation, found none");
 }
 
-std::vector<std::string_view> TabSeparated(std::string_view line) {
-  std::vector<std::string_view> words;
-  for (size_t at = 0; at <= line.size();) {
-    const size_t end = std::min(line.find('\t', at), line.size());
-    words.push_back(line.substr(at, end - at));
-    at = end + 1;
-  }
-  return words;
-}
-
-double TrackNumber(std::string_view word, const std::string& where) {
-  double number = 0;
-  const auto [end, failure] = std::from_chars(word.data(), word.data() + word.size(), number);
-  if (failure == std::errc() && end == word.data() + word.size() && std::isfinite(number)) {
-    return number;
-  }
-  throw Error(where + ": expected a finite number, found '" + Printable(std::string(word)) + "'");
-}
-
 // Observations out of tracks.csv, "image track feature x y ...", of the points by their id.
 void ReadTracks(const fs::path& file, const std::map<std::string, size_t>& point_of,
                 const std::map<std::string, size_t>& camera_of, ForeignScene& scene) {
-  const std::string text = ReadFile(file, kMaxTracksBytes);
-  size_t line_number = 0;
-  for (size_t at = 0; at < text.size();) {
-    const size_t end = std::min(text.find('\n', at), text.size());
-    std::string_view line(text.data() + at, end - at);
-    at = end + 1;
-    ++line_number;
-    if (line.ends_with('\r')) line.remove_suffix(1);
-    if (line.empty() || line.starts_with("OPENSFM_TRACKS")) continue;
-    const std::string where = fmt::format("{}:{}", file.string(), line_number);
-    const auto words = TabSeparated(line);
+  TextRows rows(ReadTextFile(file, kMaxTracksBytes), file.string());
+  rows.SetSeparator('\t');
+  while (rows.Next()) {
+    const std::vector<std::string>& words = rows.cells();
+    if (words.front().starts_with("OPENSFM_TRACKS")) continue;
     if (words.size() < 5) {
-      throw Error(where + ": expected image, track, feature, x and y between tabs, found less");
+      throw Error(rows.Where() +
+                  "expected image, track, feature, x and y between tabs, found less");
     }
-    const auto camera = camera_of.find(std::string(words[0]));
-    const auto point = point_of.find(std::string(words[1]));
-    const double x = TrackNumber(words[3], where), y = TrackNumber(words[4], where);
+    const auto camera = camera_of.find(words[0]);
+    const auto point = point_of.find(words[1]);
+    const double x = rows.Number(3, "x"), y = rows.Number(4, "y");
     if (camera == camera_of.end() || point == point_of.end()) continue;
     const ForeignIntrinsics& intrinsics = scene.cameras[camera->second].intrinsics;
     const double side = std::max(intrinsics.width_px, intrinsics.height_px);

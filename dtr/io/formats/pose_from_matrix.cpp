@@ -42,7 +42,9 @@ void RequireFinite(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& trans
 }
 
 void RequireLastRow(const Eigen::Matrix4d& matrix, const std::string& what) {
-  if (matrix.row(3) == Eigen::RowVector4d(0, 0, 0, 1)) return;
+  constexpr double kFloatRounding = 1e-6;  // phones multiply poses in floats: 1.0000001
+  const Eigen::RowVector4d difference = matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1);
+  if (difference.cwiseAbs().maxCoeff() <= kFloatRounding && matrix.row(3).allFinite()) return;
   throw Error(what + ": expected 0 0 0 1 as the last row of the matrix, found another");
 }
 

@@ -1,15 +1,11 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
-#include <charconv>
-#include <cmath>
-#include <map>
 #include <numbers>
 
 #include "dtr/base/error.h"
-#include "dtr/base/file_names.h"
-#include "dtr/base/files.h"
-#include "dtr/base/lower_case.h"
+#include "dtr/base/text_file.h"
+#include "dtr/base/text_rows.h"
 #include "dtr/io/formats/foreign_readers.h"
 #include "dtr/io/formats/pose_from_matrix.h"
 
@@ -17,84 +13,33 @@ namespace dtr::io {
 namespace {
 
 constexpr std::uintmax_t kMaxCsvBytes = 64u << 20;
+constexpr std::string_view kCount = "#cameras";
 
-std::vector<std::string> CsvWords(std::string_view line) {
-  std::vector<std::string> words;
-  for (size_t at = 0; at <= line.size();) {
-    const size_t end = std::min(line.find(',', at), line.size());
-    std::string_view word = line.substr(at, end - at);
-    while (!word.empty() && (word.front() == ' ' || word.front() == '\t')) word.remove_prefix(1);
-    while (!word.empty() && (word.back() == ' ' || word.back() == '\t')) word.remove_suffix(1);
-    words.emplace_back(word);
-    at = end + 1;
-  }
-  return words;
+// Of a first line "#cameras 5", which older versions write.
+std::optional<double> AnnouncedCameras(std::string_view text) {
+  const std::vector<std::string> words = CellsOf(text.substr(0, text.find('\n')), ' ');
+  if (words.size() < 2 || words[0] != kCount) return std::nullopt;
+  return FiniteNumber(words[1]);
 }
 
-// The first line's names, as the older and the newer versions of the program call the columns.
-class CsvColumns {
- public:
-  CsvColumns(std::string_view line, const std::string& where) {
-    while (line.starts_with('#')) line.remove_prefix(1);
-    const std::vector<std::string> names = CsvWords(line);
-    for (size_t i = 0; i < names.size(); ++i) {
-      // "k1 (comment)": some templates explain a column behind its name.
-      const std::string name = LowerCase(names[i].substr(0, names[i].find(' ')));
-      if (!index_.emplace(name, i).second) {
-        throw Error(fmt::format("{}: the column {} stands twice", where, Printable(name)));
-      }
-    }
-    count_ = names.size();
-  }
-
-  size_t count() const { return count_; }
-  std::optional<size_t> Find(std::initializer_list<const char*> names) const {
-    for (const char* name : names) {
-      if (const auto found = index_.find(name); found != index_.end()) return found->second;
-    }
-    return std::nullopt;
-  }
-
- private:
-  std::map<std::string, size_t> index_;
-  size_t count_ = 0;
-};
-
+// The cells of a camera. Older and newer versions of the program call the columns differently.
 class CsvRow {
  public:
-  CsvRow(const CsvColumns& columns, std::vector<std::string> words, std::string where)
-      : columns_(columns), words_(std::move(words)), where_(std::move(where)) {}
+  CsvRow(const TextTable& table, std::string where) : table_(table), where_(std::move(where)) {}
 
   const std::string& where() const { return where_; }
-  const std::string& Text(const char* name) const { return words_[columns_.Find({name}).value()]; }
   double Number(std::initializer_list<const char*> names) const {
-    const auto column = columns_.Find(names);
-    if (!column) {
-      throw Error(fmt::format("{}: expected a column {}, found none; export with all columns",
-                              where_, *names.begin()));
-    }
-    return From(*column, *names.begin());
+    if (const auto column = table_.Find(names)) return table_.Number(*column);
+    throw Error(fmt::format("{}: expected a column {}, found none; export with all columns", where_,
+                            *names.begin()));
   }
   double NumberOrZero(std::initializer_list<const char*> names) const {
-    const auto column = columns_.Find(names);
-    return column ? From(*column, *names.begin()) : 0;
+    const auto column = table_.Find(names);
+    return column ? table_.Number(*column) : 0;
   }
 
  private:
-  double From(size_t column, const char* name) const {
-    const std::string& word = words_[column];
-    const char* begin = word.data() + (word.starts_with('+') ? 1 : 0);
-    double number = 0;
-    const auto [end, failure] = std::from_chars(begin, word.data() + word.size(), number);
-    if (failure == std::errc() && end == word.data() + word.size() && std::isfinite(number)) {
-      return number;
-    }
-    throw Error(fmt::format("{}: {}: expected a finite number, found '{}'", where_, name,
-                            Printable(word.substr(0, 40))));
-  }
-
-  const CsvColumns& columns_;
-  std::vector<std::string> words_;
+  const TextTable& table_;
   std::string where_;
 };
 
@@ -159,45 +104,31 @@ ForeignCamera OpenCvCamera(const CsvRow& row) {
 
 ForeignScene ReadRealityScanCsv(const std::filesystem::path& file) {
   const std::string source = file.string();
-  const std::string text = ReadFile(file, kMaxCsvBytes);
-  if (text.empty() || text.back() != '\n') {
-    throw Error(source +
-                ": expected a line end at the end of the file, found none; the file is "
-                "cut short (add the line end if it is not)");
+  std::string text = ReadTextFile(file, kMaxCsvBytes);
+  const std::optional<double> announced = AnnouncedCameras(text);
+  TextTable table(std::move(text), source, kCount);
+  const auto name = table.Find({"name"});
+  if (!name) {
+    throw Error(table.Where() +
+                "expected a first line #name,x,y,alt,..., found another; export "
+                "\"Internal/External camera parameters\"");
   }
+  const bool has_matrices = table.Find({"r00"}).has_value();
   ForeignScene scene;
-  std::optional<CsvColumns> columns;
-  size_t number = 0;
-  for (size_t at = 0; at < text.size();) {
-    const size_t end = text.find('\n', at);
-    std::string_view line(text.data() + at, end - at);
-    at = end + 1;
-    ++number;
-    if (line.ends_with('\r')) line.remove_suffix(1);
-    const std::string where = fmt::format("{}:{}", source, number);
-    if (line.empty() || line.starts_with("#cameras")) continue;
-    if (!columns) {
-      columns.emplace(line, where);
-      if (!columns->Find({"name"})) {
-        throw Error(where +
-                    ": expected a first line #name,x,y,alt,..., found another; export "
-                    "\"Internal/External camera parameters\"");
-      }
-      continue;
-    }
-    if (line.starts_with('#')) continue;
-    std::vector<std::string> words = CsvWords(line);
-    if (words.size() != columns->count()) {
-      throw Error(fmt::format("{}: expected {} columns as the first line has, found {}", where,
-                              columns->count(), words.size()));
-    }
-    const CsvRow row(*columns, std::move(words), where);
-    ForeignCamera camera = columns->Find({"r00"}) ? OpenCvCamera(row) : FilmCamera(row);
-    camera.path = row.Text("name");
-    camera.entry = fmt::format("line {}", number);
+  while (table.Next()) {
+    const CsvRow row(table, fmt::format("{}:{}", source, table.line()));
+    ForeignCamera camera = has_matrices ? OpenCvCamera(row) : FilmCamera(row);
+    camera.path = table.Cell(*name);
+    camera.entry = fmt::format("line {}", table.line());
     scene.cameras.push_back(std::move(camera));
   }
   if (scene.cameras.empty()) throw Error(source + ": expected at least one camera, found none");
+  if (announced && *announced != static_cast<double>(scene.cameras.size())) {
+    throw Error(
+        fmt::format("{}: expected {} cameras, as its first line says, found {}; the file "
+                    "is cut short",
+                    source, *announced, scene.cameras.size()));
+  }
   return scene;
 }
 

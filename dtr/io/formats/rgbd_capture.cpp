@@ -8,7 +8,8 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/file_names.h"
-#include "dtr/base/files.h"
+#include "dtr/base/text_file.h"
+#include "dtr/base/text_rows.h"
 #include "dtr/io/formats/plausible_intrinsics.h"
 #include "dtr/io/formats/pose_from_matrix.h"
 #include "dtr/io/formats/rgbd_parts.h"
@@ -62,15 +63,8 @@ SizedImage SizedPhoto(const fs::path& folder, const std::string& name) {
   return {name, header.width_px, header.height_px, header.exif_orientation};
 }
 
-std::string PlainText(const fs::path& file) {
-  std::string text = ReadFile(file, kMaxTextBytes);
-  bool comment = false, at_start = true;
-  for (char& c : text) {
-    if (at_start) comment = c == '#';
-    at_start = c == '\n';
-    if (c == ',' || (comment && c != '\n')) c = ' ';
-  }
-  return text;
+std::string NumbersOfFile(const fs::path& file) {
+  return NumbersText(ReadTextFile(file, kMaxTextBytes), file.string());
 }
 
 bool HoldsNoNumber(std::string_view text) {
@@ -201,6 +195,7 @@ const std::vector<Layout>& Layouts() {
       {"polycam", {"keyframes"}, internal::ReadPolycam},
       {"record3d", {"metadata.json", "rgb"}, internal::ReadRecord3d},
       {"stray-scanner", {"camera_matrix.csv", "odometry.csv"}, internal::ReadStrayScanner},
+      {"3d-scanner-app", {}, internal::Read3dScannerApp},
       {"arkitscenes", {"lowres_wide.traj"}, internal::ReadArkitScenes},
       {"scannet", {"pose", "intrinsic", "color"}, internal::ReadScanNet},
       {"tum", {"rgb.txt", "groundtruth.txt"}, internal::ReadTum},
@@ -241,6 +236,7 @@ std::string RgbdFormatOf(const std::filesystem::path& capture) {
     }
   }
   if (internal::IsUnpackedRecord3d(capture)) return "record3d";
+  if (internal::Is3dScannerApp(capture)) return "3d-scanner-app";
   if (EndsLike(capture, ".pose.txt")) return "7scenes";
   if (std::filesystem::is_directory(capture / "depth", ignored) && EndsLike(capture, ".log")) {
     return "open3d";

@@ -34,6 +34,7 @@ struct RgbdCapture {
 ///   record3d      metadata.json, rgb/N.jpg, depth/N.exr ("EXR + RGB"); a .r3d file, or what is in
 ///                 one: metadata, rgbd/N.jpg, rgbd/N.depth
 ///   stray-scanner camera_matrix.csv, odometry.csv, depth/N.png, rgb/N.jpg (frames of rgb.mp4)
+///   3d-scanner-app frame_N.json, frame_N.jpg (of some), depth_N.png, conf_N.png ("All data")
 ///   arkitscenes   lowres_wide.traj, lowres_wide/, lowres_wide_intrinsics/, lowres_depth/
 ///   scannet       color/, depth/, pose/, intrinsic/ (of its export program)
 ///   tum           rgb.txt, depth.txt, groundtruth.txt

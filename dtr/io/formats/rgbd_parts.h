@@ -31,8 +31,8 @@ void TakeConfidence(const fs::path& folder, const char* extension, RgbdCapture& 
 fs::path FolderOf(const fs::path& capture, std::initializer_list<const char*> names);
 SizedImage SizedPhoto(const fs::path& folder, const std::string& name);
 
-/// The file's text with commas made blanks, without lines that begin with '#'.
-std::string PlainText(const fs::path& file);
+/// NumbersText of a file: words between blanks, without comments.
+std::string NumbersOfFile(const fs::path& file);
 /// "inf" or "nan" in it: how programs write a pose that was lost.
 bool HoldsNoNumber(std::string_view text);
 
@@ -52,10 +52,13 @@ void AddFrame(const SizedImage& photo, const PinholeCamera& camera, const Pose& 
               const std::string& depth_file, RgbdCapture& capture);
 
 RgbdCapture ReadPolycam(const fs::path& folder, const fs::path& images);
+/// Whether it has files frame_N.json and depth_N.png side by side, as 3D Scanner App exports them.
+bool Is3dScannerApp(const fs::path& folder);
 /// Whether it holds what a .r3d file does: `metadata` and rgbd/.
 bool IsUnpackedRecord3d(const fs::path& folder);
 RgbdCapture ReadRecord3d(const fs::path& folder, const fs::path& images);
 RgbdCapture ReadStrayScanner(const fs::path& folder, const fs::path& images);
+RgbdCapture Read3dScannerApp(const fs::path& folder, const fs::path& images);
 RgbdCapture ReadArkitScenes(const fs::path& folder, const fs::path& images);
 RgbdCapture ReadScanNet(const fs::path& folder, const fs::path& images);
 RgbdCapture ReadTum(const fs::path& folder, const fs::path& images);

@@ -1,13 +1,14 @@
 // Captures of phones, whose poses and intrinsics are ARKit's.
 #include <fmt/format.h>
 
-#include <array>
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <map>
 
 #include "dtr/base/error.h"
-#include "dtr/base/files.h"
+#include "dtr/base/text_file.h"
+#include "dtr/base/text_rows.h"
 #include "dtr/io/formats/json_fields.h"
 #include "dtr/io/formats/pose_from_matrix.h"
 #include "dtr/io/formats/rgbd_parts.h"
@@ -55,7 +56,7 @@ RgbdCapture ReadPolycam(const fs::path& folder, const fs::path& images) {
       capture.skipped.emplace_back(stem, "no photo in " + capture.images.string());
       continue;
     }
-    const Json json = ParseJson(ReadFile(file, kMaxTextBytes), file.string());
+    const Json json = ParseJson(ReadTextFile(file, kMaxTextBytes), file.string());
     const SizedImage photo = SizedPhoto(capture.images, photo_name);
     Eigen::Matrix3d k = Eigen::Matrix3d::Identity();
     k(0, 0) = NumberField(json, "fx", file.string()),
@@ -76,35 +77,36 @@ RgbdCapture ReadPolycam(const fs::path& folder, const fs::path& images) {
 
 namespace {
 
-/// odometry.csv: a header with names of columns, then a line of numbers a frame.
-class Odometry {
- public:
-  explicit Odometry(const fs::path& file) : source_(file.string()), text_(PlainText(file)) {
-    const size_t end = text_.find('\n');
-    TextNumbers header(text_.substr(0, end), source_);
-    for (size_t i = 0; !header.AtEnd(); ++i) columns_[header.Word("a column")] = i;
-    for (const char* column : {"frame", "x", "y", "z", "qx", "qy", "qz", "qw"}) {
-      if (columns_.contains(column)) continue;
-      throw Error(
-          fmt::format("{}: expected a column {}, found none in its first line", source_, column));
-    }
-    text_ = end == std::string::npos ? "" : text_.substr(end + 1);
+/// Intrinsics that a row of odometry.csv has of its own frame: the phone focuses while it records.
+/// Older versions of the program have no such columns; cells may be empty.
+std::optional<Eigen::Matrix3d> OwnIntrinsics(const TextTable& odometry) {
+  Eigen::Matrix3d k = Eigen::Matrix3d::Identity();
+  const std::pair<const char*, double*> values[] = {
+      {"fx", &k(0, 0)}, {"fy", &k(1, 1)}, {"cx", &k(0, 2)}, {"cy", &k(1, 2)}};
+  for (const auto& [name, value] : values) {
+    const auto column = odometry.Find({name});
+    if (!column || odometry.Cell(*column).empty()) return std::nullopt;
+    *value = odometry.Number(*column);
   }
+  return k;
+}
 
-  template <typename OnFrame>
-  void ForEach(OnFrame on_frame) const {
-    TextNumbers numbers(text_, source_);
-    std::vector<double> row(columns_.size());
-    while (!numbers.AtEnd()) {
-      for (double& number : row) number = numbers.Number("a number for each column");
-      on_frame([&](const char* column) { return row[columns_.at(column)]; });
-    }
+std::string StrayFrameName(const TextTable& odometry) {
+  constexpr double kMaxFrame = 999999;
+  const double frame = odometry.Number(odometry.Column({"frame"}));
+  if (frame >= 0 && frame <= kMaxFrame && frame == std::floor(frame)) {
+    return fmt::format("{:06d}", static_cast<int>(frame));
   }
+  throw Error(
+      fmt::format("{}expected a frame number from 0 to 999999, found {}", odometry.Where(), frame));
+}
 
- private:
-  std::string source_, text_;
-  std::map<std::string, size_t> columns_;
-};
+Pose StrayPose(const TextTable& odometry) {
+  const auto value = [&](const char* name) { return odometry.Number(odometry.Column({name})); };
+  const Eigen::Quaterniond world_from_cam(value("qw"), value("qx"), value("qy"), value("qz"));
+  return PoseFrom(world_from_cam, {value("x"), value("y"), value("z")},
+                  fmt::format("{}frame {}", odometry.Where(), StrayFrameName(odometry)));
+}
 
 }  // namespace
 
@@ -122,30 +124,97 @@ RgbdCapture ReadStrayScanner(const fs::path& folder, const fs::path& images) {
         "rgb.mp4 -start_number 0 -q:v 2 rgb/%06d.jpg",
         folder.string(), folder.string()));
   }
-  const fs::path matrix = folder / "camera_matrix.csv";
-  TextNumbers numbers(PlainText(matrix), matrix.string());
-  const Eigen::Matrix3d k = numbers.Matrix3("9 numbers");
-  numbers.ExpectEnd();
-  const std::string where = (folder / "odometry.csv").string();
-  Odometry(folder / "odometry.csv").ForEach([&](const auto& value) {
-    const double frame = value("frame");
-    if (!(frame >= 0) || frame > 999999 || frame != std::floor(frame)) {
-      throw Error(
-          fmt::format("{}: expected a frame number from 0 to 999999, found {}", where, frame));
-    }
-    const std::string stem = fmt::format("{:06d}", static_cast<int>(frame));
+  const fs::path matrix = folder / "camera_matrix.csv", file = folder / "odometry.csv";
+  const Eigen::Matrix3d k_of_all = ReadMatrix3Text(matrix);
+  TextTable odometry(ReadTextFile(file, kMaxTextBytes), file.string());
+  for (const char* name : {"frame", "x", "y", "z", "qx", "qy", "qz", "qw"}) odometry.Column({name});
+  while (odometry.Next()) {
+    const std::string stem = StrayFrameName(odometry);
+    const Pose cam_from_world = StrayPose(odometry);
     const std::string photo_name = PhotoCalled(capture.images, stem);
     if (photo_name.empty()) {
       capture.skipped.emplace_back(stem, "no photo in " + capture.images.string());
-      return;
+      continue;
     }
     const SizedImage photo = SizedPhoto(capture.images, photo_name);
-    const Eigen::Quaterniond turn(value("qw"), value("qx"), value("qy"), value("qz"));
-    AddFrame(photo, CameraFor(k, PixelOrigin::kCorner, photo, {{1920, 1440}}, matrix.string()),
-             PoseFrom(turn, {value("x"), value("y"), value("z")}, where + ": frame " + stem),
-             DepthCalled(capture.depth, stem, ".png"), capture);
-  });
+    const auto own = OwnIntrinsics(odometry);
+    const std::string where = own ? odometry.Where() + "intrinsics" : matrix.string();
+    AddFrame(photo,
+             CameraFor(own.value_or(k_of_all), PixelOrigin::kCorner, photo, {{1920, 1440}}, where),
+             cam_from_world, DepthCalled(capture.depth, stem, ".png"), capture);
+  }
   TakeConfidence(folder / "confidence", ".png", capture);
+  return capture;
+}
+
+namespace {
+
+constexpr std::string_view kFramePrefix = "frame_", kDepthPrefix = "depth_", kConfPrefix = "conf_";
+
+/// What stands in "frame_N.json" for N; empty: the name is another one.
+std::string ScannerFrame(const std::string& name) {
+  const fs::path file = name;
+  const std::string stem = file.stem().string();
+  if (file.extension() != ".json" || !stem.starts_with(kFramePrefix)) return "";
+  return stem.substr(kFramePrefix.size());
+}
+
+/// A matrix as the list of its numbers, row by row.
+template <int kSide>
+Eigen::Matrix<double, kSide, kSide> ListedMatrix(const Json& json, const char* key,
+                                                 const std::string& where) {
+  const Json& list = Field(json, key, where);
+  if (!list.is_array() || list.size() != size_t{kSide * kSide}) {
+    throw Error(fmt::format("{}.{}: expected a list of {} numbers, found another", where, key,
+                            kSide * kSide));
+  }
+  Eigen::Matrix<double, kSide, kSide> matrix;
+  for (int i = 0; i < kSide * kSide; ++i) {
+    matrix(i / kSide, i % kSide) =
+        NumberFrom(list[static_cast<size_t>(i)], fmt::format("{}.{}[{}]", where, key, i));
+  }
+  return matrix;
+}
+
+}  // namespace
+
+bool Is3dScannerApp(const fs::path& folder) {
+  const std::vector<std::string> names = NamesIn(folder);
+  return std::any_of(names.begin(), names.end(), [&](const std::string& name) {
+    const std::string frame = ScannerFrame(name);
+    return !frame.empty() &&
+           !DepthCalled(folder, std::string(kDepthPrefix) + frame, ".png").empty();
+  });
+}
+
+// 3D Scanner App, "All data": https://github.com/laanlabs/3dScannerApp_samples. Every frame has its
+// depth and pose, some have photos. Poses are ARKit's, world_from_cam; intrinsics are of photos of
+// 1920x1440, whatever size was exported.
+RgbdCapture Read3dScannerApp(const fs::path& folder, const fs::path& images) {
+  RgbdCapture capture;
+  capture.images = images.empty() ? folder : images;
+  capture.depth = folder;
+  capture.depth_unit_m = kMillimetre;
+  for (const std::string& name : NamesIn(folder)) {
+    const std::string frame = ScannerFrame(name);
+    if (frame.empty()) continue;
+    const std::string stem = std::string(kFramePrefix) + frame;
+    const std::string photo_name = PhotoCalled(capture.images, stem);
+    if (photo_name.empty()) {
+      capture.skipped.emplace_back(stem, "no photo in " + capture.images.string());
+      continue;
+    }
+    const std::string where = (folder / name).string();
+    const Json json = ParseJson(ReadTextFile(folder / name, kMaxTextBytes), where);
+    const SizedImage photo = SizedPhoto(capture.images, photo_name);
+    AddFrame(photo,
+             CameraFor(ListedMatrix<3>(json, "intrinsics", where), PixelOrigin::kCorner, photo,
+                       {{1920, 1440}}, where + ".intrinsics"),
+             PoseFromGl(ListedMatrix<4>(json, "cameraPoseARFrame", where), where),
+             DepthCalled(capture.depth, std::string(kDepthPrefix) + frame, ".png"), capture);
+  }
+  TakeConfidence(folder, ".png", capture);
+  capture.confidence.prefix = {std::string(kDepthPrefix), std::string(kConfPrefix)};
   return capture;
 }
 
@@ -158,14 +227,18 @@ RgbdCapture ReadArkitScenes(const fs::path& folder, const fs::path& images) {
   capture.depth_unit_m = kMillimetre;
   const fs::path intrinsics = FolderOf(folder, {"lowres_wide_intrinsics"});
   const fs::path file = folder / "lowres_wide.traj";
-  TextNumbers numbers(PlainText(file), file.string());
+  TextRows rows(ReadTextFile(file, kMaxTextBytes), file.string());
   std::map<long, Pose> poses;  // by milliseconds
-  while (!numbers.AtEnd()) {
-    const double seconds = numbers.Number("a time");
-    const Eigen::Vector3d turn = numbers.Vector3("a rotation (3 numbers)");
-    const Eigen::Vector3d shift = numbers.Vector3("a translation (3 numbers)");
+  while (rows.Next()) {
+    rows.ExpectCells(7, "time, rotation and translation");
+    const double seconds = rows.Number(0, "a time");
+    Eigen::Vector3d turn, shift;
+    for (size_t i = 0; i < 3; ++i) {
+      turn[static_cast<int>(i)] = rows.Number(1 + i, "a rotation");
+      shift[static_cast<int>(i)] = rows.Number(4 + i, "a translation");
+    }
     if (!(std::abs(seconds) < 1e9)) {
-      throw Error(numbers.Where() + "expected a time in seconds, found one beyond all recordings");
+      throw Error(rows.Where() + "expected a time in seconds, found one beyond all recordings");
     }
     const double angle = turn.norm();
     const Eigen::Vector3d axis =

@@ -8,8 +8,8 @@
 #include <optional>
 
 #include "dtr/base/error.h"
-#include "dtr/base/files.h"
 #include "dtr/base/temporary_folder.h"
+#include "dtr/base/text_file.h"
 #include "dtr/io/formats/json_fields.h"
 #include "dtr/io/formats/record3d_file.h"
 #include "dtr/io/formats/rgbd_parts.h"
@@ -73,7 +73,7 @@ void ListWithoutPose(size_t poses, RgbdCapture& capture) {
 RgbdCapture ReadLayout(const Record3dLayout& layout, const fs::path& folder, const fs::path& images,
                        const fs::path& source) {
   const std::string where = (source / layout.metadata).string();
-  const Json metadata = ParseJson(ReadFile(folder / layout.metadata, kMaxTextBytes), where);
+  const Json metadata = ParseJson(ReadTextFile(folder / layout.metadata, kMaxTextBytes), where);
   RgbdCapture capture;
   capture.images = images.empty() ? folder / layout.photos : images;
   capture.depth = folder / layout.depth;

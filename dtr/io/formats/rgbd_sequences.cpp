@@ -7,7 +7,8 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/file_names.h"
-#include "dtr/base/files.h"
+#include "dtr/base/text_file.h"
+#include "dtr/base/text_rows.h"
 #include "dtr/io/formats/json_fields.h"
 #include "dtr/io/formats/pose_from_matrix.h"
 #include "dtr/io/formats/rgbd_parts.h"
@@ -60,7 +61,7 @@ RgbdCapture ReadScanNet(const fs::path& folder, const fs::path& images) {
   const fs::path colour_file = folder / "intrinsic" / "intrinsic_color.txt";
   const fs::path depth_file = folder / "intrinsic" / "intrinsic_depth.txt";
   const auto matrix_in = [](const fs::path& file) {
-    TextNumbers text(file);
+    TextNumbers text(NumbersOfFile(file), file.string());
     const Eigen::Matrix3d k = text.Matrix4("16 numbers").topLeftCorner<3, 3>();
     text.ExpectEnd();
     return k;
@@ -78,7 +79,7 @@ RgbdCapture ReadScanNet(const fs::path& folder, const fs::path& images) {
     if (file.extension() != ".txt") continue;
     const std::string stem = file.stem().string();
     const std::string photo_name = PhotoCalled(capture.images, stem);
-    const std::string text = ReadFile(file, kMaxTextBytes);
+    const std::string text = NumbersOfFile(file);
     if (photo_name.empty() || HoldsNoNumber(text)) {
       capture.skipped.emplace_back(stem, photo_name.empty()
                                              ? "no photo in " + capture.images.string()
@@ -103,13 +104,12 @@ namespace {
 
 /// A list of times and files ("time name" a line).
 std::map<double, std::string> TimedFiles(const fs::path& file) {
-  TextNumbers text(PlainText(file), file.string());
+  TextRows rows(ReadTextFile(file, kMaxTextBytes), file.string());
   std::map<double, std::string> files;
-  while (!text.AtEnd()) {
-    const double time = text.Number("a time");
-    const std::string name = text.Word("a file name");
-    RequireSafeName(name, text.Where());
-    files[time] = name;
+  while (rows.Next()) {
+    rows.ExpectCells(2, "a time and the name of a file");
+    RequireSafeName(rows.cells()[1], rows.Where());
+    files[rows.Number(0, "a time")] = rows.cells()[1];
   }
   return files;
 }
@@ -120,19 +120,21 @@ struct TimedPose {
 };
 
 std::map<double, TimedPose> TimedPoses(const fs::path& file) {
-  TextNumbers text(PlainText(file), file.string());
+  TextRows rows(ReadTextFile(file, kMaxTextBytes), file.string());
   std::map<double, TimedPose> poses;
-  while (!text.AtEnd()) {
-    const double time = text.Number("a time");
+  while (rows.Next()) {
+    rows.ExpectCells(8, "time, position and quaternion");
     TimedPose pose;
-    pose.centre = text.Vector3("a position (3 numbers)");
-    for (int i = 0; i < 4; ++i) pose.world_from_cam.coeffs()[i] = text.Number("a quaternion");
+    for (size_t i = 0; i < 3; ++i) pose.centre[int(i)] = rows.Number(1 + i, "a position");
+    for (size_t i = 0; i < 4; ++i) {
+      pose.world_from_cam.coeffs()[int(i)] = rows.Number(4 + i, "a quaternion");
+    }
     if (!(std::abs(pose.world_from_cam.norm() - 1) <= kPrintedRotationTolerance)) {
-      throw Error(fmt::format("{}expected a quaternion of length 1, found {:.4g}", text.Where(),
+      throw Error(fmt::format("{}expected a quaternion of length 1, found {:.4g}", rows.Where(),
                               pose.world_from_cam.norm()));
     }
     pose.world_from_cam.normalize();
-    poses[time] = pose;
+    poses[rows.Number(0, "a time")] = pose;
   }
   return poses;
 }
@@ -261,7 +263,7 @@ SequenceCamera Open3dCameraOf(const fs::path& folder, PinholeCamera* full, RgbdC
     const fs::path file = folder / name;
     if (file.extension() != ".json" || name.find("intrinsic") == std::string::npos) continue;
     const std::string where = file.string();
-    const Json json = ParseJson(ReadFile(file, kMaxTextBytes), where);
+    const Json json = ParseJson(ReadTextFile(file, kMaxTextBytes), where);
     const Json& numbers = Field(json, "intrinsic_matrix", where);
     if (!numbers.is_array() || numbers.size() != 9) {
       throw Error(where + ": intrinsic_matrix: expected 9 numbers, found another list");
@@ -353,7 +355,7 @@ RgbdCapture Read7Scenes(const fs::path& folder, const fs::path& images) {
     if (!name.ends_with(ending)) continue;
     const std::string frame = name.substr(0, name.size() - ending.size());
     const std::string photo_name = PhotoCalled(capture.images, frame + ".color");
-    const std::string text = ReadFile(folder / name, kMaxTextBytes);
+    const std::string text = ReadTextFile(folder / name, kMaxTextBytes);
     if (photo_name.empty() || HoldsNoNumber(text)) {
       capture.skipped.emplace_back(frame, photo_name.empty()
                                               ? "no photo in " + capture.images.string()

@@ -9,8 +9,7 @@
 
 namespace dtr::io::internal {
 
-/// Words and numbers of a text that ends with a line end: without one a number cut in its middle
-/// would pass for a shorter number.
+/// Words and numbers of a text of up to 512 MB.
 class SceneText : public TextNumbers {
  public:
   static constexpr int kMaxCount = 1 << 30;

@@ -5,6 +5,8 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/file_names.h"
+#include "dtr/base/text_file.h"
+#include "dtr/base/text_rows.h"
 #include "dtr/io/formats/cameras_json.h"
 #include "dtr/io/formats/pose_from_matrix.h"
 #include "dtr/io/formats/text_numbers.h"
@@ -12,6 +14,16 @@
 namespace dtr::io {
 
 using internal::TextNumbers;
+
+namespace {
+
+// A file of numbers alone.
+TextNumbers NumbersIn(const std::filesystem::path& file) {
+  constexpr std::uintmax_t kMaxBytes = 1u << 20;
+  return {NumbersText(ReadTextFile(file, kMaxBytes), file.string()), file.string()};
+}
+
+}  // namespace
 
 PinholeCamera CameraFromK(const Eigen::Matrix3d& k, int width_px, int height_px, PixelOrigin origin,
                           const std::string& what) {
@@ -103,14 +115,14 @@ std::vector<LogPose> ReadOpen3dLog(const std::filesystem::path& file) {
 }
 
 Pose ReadWorldFromCamText(const std::filesystem::path& file) {
-  TextNumbers text(file);
+  TextNumbers text = NumbersIn(file);
   const Eigen::Matrix4d world_from_cam = text.Matrix4("a 4x4 pose");
   text.ExpectEnd();
   return PoseFromWorldFromCam(world_from_cam, kPrintedRotationTolerance, file.string());
 }
 
 Eigen::Matrix3d ReadMatrix3Text(const std::filesystem::path& file) {
-  TextNumbers text(file);
+  TextNumbers text = NumbersIn(file);
   const Eigen::Matrix3d matrix = text.Matrix3("9 numbers");
   text.ExpectEnd();
   return matrix;

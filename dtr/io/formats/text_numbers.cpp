@@ -1,11 +1,10 @@
 #include "dtr/io/formats/text_numbers.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
 #include "dtr/base/error.h"
-#include "dtr/base/files.h"
+#include "dtr/base/text_file.h"
 
 namespace dtr::io::internal {
 namespace {
@@ -24,7 +23,7 @@ std::string Shown(std::string_view word) {
 }  // namespace
 
 TextNumbers::TextNumbers(const std::filesystem::path& file)
-    : text_(ReadFile(file, kMaxTextBytes)), source_(file.string()) {}
+    : text_(ReadTextFile(file, kMaxTextBytes)), source_(file.string()) {}
 
 TextNumbers::TextNumbers(std::string text, std::string source)
     : text_(std::move(text)), source_(std::move(source)) {}
@@ -43,9 +42,7 @@ std::string_view TextNumbers::Line() {
   const size_t end = std::min(text_.find('\n', begin), text_.size());
   position_ = std::min(end + 1, text_.size());
   if (end < text_.size()) ++line_;
-  std::string_view line = std::string_view(text_).substr(begin, end - begin);
-  if (line.ends_with('\r')) line.remove_suffix(1);
-  return line;
+  return std::string_view(text_).substr(begin, end - begin);
 }
 
 void TextNumbers::ExpectEnd() {
@@ -74,16 +71,9 @@ std::string TextNumbers::Word(const char* what) {
 
 double TextNumbers::Number(const char* what) {
   const std::string word = Word(what);
-  const char* begin = word.data();
-  const char* end = begin + word.size();
-  if (*begin == '+' && word.size() > 1 && word[1] != '-') ++begin;  // from_chars knows no '+'
-  double number = 0;
-  const auto result = std::from_chars(begin, end, number);
-  if (result.ec != std::errc() || result.ptr != end || !std::isfinite(number)) {
-    throw Error(Where() + "expected " + what + " as a finite number, found \"" + Shown(word) +
-                "\"");
-  }
-  return number;
+  if (const auto number = FiniteNumber(word)) return *number;
+  throw Error(Where() + "expected " + what + " as a finite number, found \"" + Shown(word) + "\"" +
+              DecimalCommaHint(word));
 }
 
 int TextNumbers::Int(const char* what, int min, int max) {

@@ -15,6 +15,7 @@ class TextNumbers {
  public:
   /// Whole file; rejects files above 64 MB: the formats read with this hold a few numbers a camera.
   explicit TextNumbers(const std::filesystem::path& file);
+  /// A text as of TextOf (dtr/base/text_file.h).
   TextNumbers(std::string text, std::string source);
 
   bool AtEnd();

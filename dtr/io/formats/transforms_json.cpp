@@ -9,7 +9,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/file_names.h"
-#include "dtr/base/files.h"
+#include "dtr/base/text_file.h"
 #include "dtr/io/formats/json_fields.h"
 #include "dtr/io/formats/plausible_intrinsics.h"
 #include "dtr/io/formats/pose_from_matrix.h"
@@ -226,13 +226,13 @@ void NoteUnused(const Json& root, const Json& frames, const std::string& source,
 
 TransformsFile ReadTransformsJson(const std::filesystem::path& file, const TransformsPaths& paths) {
   const std::string source = file.string();
-  const Json root = internal::ParseJson(ReadFile(file, kMaxTransformsBytes), source);
+  const Json root = internal::ParseJson(ReadTextFile(file, kMaxTransformsBytes), source);
   const Json& frames = internal::Field(root, "frames", source);
   if (!frames.is_array() || frames.empty()) {
     throw Error(source + ": frames: expected a list of at least one camera, found another");
   }
   TransformsFile out;
-  out.list.unit = LengthUnit::kArbitrary;
+  out.list.unit = LengthUnit::kUnknown;
   out.list.photo_grid = PhotoGrid::kStored;  // these programs do not turn photos
   std::set<std::string> names;
   std::vector<std::string> paths_of;
@@ -262,7 +262,7 @@ TransformsFile ReadTransformsJson(const std::filesystem::path& file, const Trans
 
 bool IsTransformsJson(const std::filesystem::path& file) {
   if (file.extension() != ".json" || !std::filesystem::is_regular_file(file)) return false;
-  const Json root = internal::ParseJson(ReadFile(file, kMaxTransformsBytes), file.string());
+  const Json root = internal::ParseJson(ReadTextFile(file, kMaxTransformsBytes), file.string());
   return root.is_object() && root.contains("frames") && !root.contains("views");
 }
 

@@ -8,6 +8,8 @@
 #include "calib/colmap/model_io.h"
 #include "dtr/base/error.h"
 #include "dtr/base/lower_case.h"
+#include "dtr/base/text_file.h"
+#include "dtr/base/text_rows.h"
 #include "dtr/io/formats/foreign_readers.h"
 #include "dtr/io/formats/plausible_intrinsics.h"
 #include "dtr/io/formats/rgbd_capture.h"
@@ -58,16 +60,15 @@ bool LooksBundler(const fs::path&, const FileLook& look) {
 bool LooksNvm(const fs::path&, const FileLook& look) { return look.head.starts_with("NVM_V3"); }
 
 // A line that names columns, "#name,x,y,alt,..." or "#name,tx,ty,tz,R00,...".
-bool LooksRealityScan(const fs::path&, const FileLook& look) {
-  std::string line = look.head.substr(0, look.head.find('\n'));
-  if (line.starts_with("#cameras")) {
-    const size_t begin = line.size() + 1;
-    line = begin < look.head.size() ? look.head.substr(begin, look.head.find('\n', begin) - begin)
-                                    : "";
-  }
-  line = LowerCase(line);
-  return line.starts_with("#name,") &&
-         (line.find(",pitch") != std::string::npos || line.find(",r00") != std::string::npos);
+bool LooksRealityScan(const fs::path& file, const FileLook& look) {
+  TextRows rows(look.head, file.string());
+  std::string_view line;
+  while (rows.NextLine(line) && (line.empty() || line.starts_with("#cameras"))) continue;
+  const std::vector<std::string> names = ColumnNames(line);
+  const auto has = [&](const char* name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  return has("name") && (has("pitch") || has("r00"));
 }
 
 bool LooksOpenSfm(const fs::path&, const FileLook& look) {
@@ -122,12 +123,24 @@ constexpr CameraFormat kFormats[] = {
     {"polycam", "a capture of Polycam", LooksCapture<0>, nullptr},
     {"record3d", "of Record3D", LooksCapture<1>, nullptr},
     {"stray-scanner", "of Stray Scanner", LooksCapture<2>, nullptr},
-    {"arkitscenes", "of ARKitScenes", LooksCapture<3>, nullptr},
-    {"scannet", "of ScanNet", LooksCapture<4>, nullptr},
-    {"tum", "a sequence of TUM RGB-D", LooksCapture<5>, nullptr},
-    {"open3d", "of Open3D", LooksCapture<6>, nullptr},
-    {"7scenes", "of 7-Scenes", LooksCapture<7>, nullptr},
+    {"3d-scanner-app", "of 3D Scanner App", LooksCapture<3>, nullptr},
+    {"arkitscenes", "of ARKitScenes", LooksCapture<4>, nullptr},
+    {"scannet", "of ScanNet", LooksCapture<5>, nullptr},
+    {"tum", "a sequence of TUM RGB-D", LooksCapture<6>, nullptr},
+    {"open3d", "of Open3D", LooksCapture<7>, nullptr},
+    {"7scenes", "of 7-Scenes", LooksCapture<8>, nullptr},
 };
+
+// A row of numbers alone: a time and a pose (8, TUM's and EuRoC's), or a matrix (12, KITTI's).
+bool LooksTrajectory(const fs::path& file, const FileLook& look) {
+  TextRows rows(look.head, file.string());
+  if (!rows.Next()) return false;
+  const std::vector<std::string>& cells = rows.cells();
+  const size_t least = 8;
+  return cells.size() >= least && std::all_of(cells.begin(), cells.end(), [](const auto& cell) {
+           return FiniteNumber(cell).has_value();
+         });
+}
 
 // What a file is that gives no cameras of photos, as a clause; empty: not known.
 std::string SeemsToBe(const fs::path& file, const FileLook& look) {
@@ -151,8 +164,17 @@ std::string SeemsToBe(const fs::path& file, const FileLook& look) {
       has("opencv-matrix") || has("camera_matrix") || look.Has("board")) {
     return "it describes the intrinsics of a camera and no photos; give it to `lens` or `rig`";
   }
-  if (look.head.starts_with("ply\n") || look.head.starts_with("ply\r\n")) {
-    return "it is a PLY file of points, not of cameras";
+  if (look.head.starts_with("ply\n")) return "it is a PLY file of points, not of cameras";
+  if (look.head.starts_with("colmap 1.0\n")) {
+    return "it is of Recon3D, from COLMAP; give COLMAP's model, or export it as NVM or Bundler";
+  }
+  if (look.head.starts_with("NVM_V")) return "only NVM_V3 is read; save it with VisualSFM 0.5";
+  if (look.head.starts_with("CONTOUR\n")) {
+    return "it is a projection matrix of PMVS; give the bundle.rd.out that it was made from";
+  }
+  if (LooksTrajectory(file, look)) {
+    return "it is a trajectory, without intrinsics and the names of photos; make a TUM sequence of "
+           "it (groundtruth.txt, rgb.txt, camera-intrinsics.txt)";
   }
   return "";
 }
@@ -218,9 +240,9 @@ bool IsColmapModel(const fs::path& file, const std::string& name) {
   return fs::is_directory(file) && LooksColmap(file, {.is_folder = true, .head = "", .keys = {}});
 }
 
-calib::SfmModel ReadGivenModel(const fs::path& folder) {
+calib::SfmModel ReadGivenModel(const fs::path& folder, std::vector<std::string>* notes) {
   const fs::path model_folder = colmap::ModelFolderIn(folder);
-  calib::SfmModel model = colmap::ReadModel(model_folder);
+  calib::SfmModel model = colmap::ReadModel(model_folder, notes);
   for (const auto& [id, camera] : model.cameras) {
     if (!calib::HasImages(model, id)) continue;
     const PinholeCamera pinhole = camera.Pinhole();
@@ -253,14 +275,10 @@ std::string LineOfUnsharedPoints(const calib::SfmModel& model, const std::string
 std::vector<fs::path> WithCompanions(const fs::path& file) {
   std::vector<fs::path> files = {file};
   if (file.empty()) return files;
-  const fs::path folder = file.parent_path();
-  fs::path stem = file;
-  stem.replace_extension();
-  for (const fs::path& beside :
-       {fs::path(file.string() + ".list.txt"), fs::path(stem.string() + ".list.txt"),
-        folder / "list.txt", folder / ".." / "list.txt", folder / "image_list.txt",
-        folder / "tracks.csv"}) {
-    if (IsFile(beside)) files.push_back(beside);
+  std::vector<fs::path> beside = io::BundlerLists(file);
+  beside.push_back(file.parent_path() / "tracks.csv");
+  for (const fs::path& other : beside) {
+    if (IsFile(other)) files.push_back(other);
   }
   return files;
 }

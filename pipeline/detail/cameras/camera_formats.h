@@ -34,8 +34,9 @@ CameraFormat FormatOf(const std::filesystem::path& file, const std::string& name
 bool IsColmapModel(const std::filesystem::path& file, const std::string& name);
 
 /// The model that a COLMAP folder holds. Throws Error as colmap::ReadModel, and for cameras of
-/// images whose focal length no camera has.
-calib::SfmModel ReadGivenModel(const std::filesystem::path& folder);
+/// images whose focal length no camera has. `notes` gets what ReadModel says.
+calib::SfmModel ReadGivenModel(const std::filesystem::path& folder,
+                               std::vector<std::string>* notes = nullptr);
 
 /// Whether two of its images see a point: others say nothing of where the scene is.
 bool HasSharedPoints(const calib::SfmModel& model);

@@ -9,12 +9,11 @@
 #include "dtr/base/error.h"
 #include "dtr/base/file_names.h"
 #include "dtr/io/formats/plausible_intrinsics.h"
+#include "pipeline/detail/cameras/point_conventions.h"
 #include "pipeline/detail/import/camera_distortion.h"
 
 namespace dtr::pipeline {
 namespace {
-
-constexpr size_t kNone = ~size_t{0};
 
 // Pixels of the file's image: what counts in long sides or from the middle is turned into that.
 io::Distortion InPixels(const io::ForeignIntrinsics& intrinsics, int width_px, int height_px) {
@@ -48,14 +47,8 @@ void RequireOwnSize(const io::ForeignIntrinsics& intrinsics, const io::SizedImag
       where, cx, cy, image.name, image.width_px, image.height_px, 2 * cx, 2 * cy));
 }
 
-struct OnPhoto {
-  io::NamedCamera named;
-  double scale_x = 1, scale_y = 1;  // photo pixels per pixel of the file
-  Eigen::Vector2d shift{0, 0};      // added to pixels of the file before that
-};
-
-OnPhoto CameraOn(const io::ForeignCamera& camera, const io::SizedImage& image,
-                 const std::string& where) {
+PlacedCamera CameraOn(const io::ForeignCamera& camera, const io::SizedImage& image,
+                      const std::string& where) {
   io::ForeignIntrinsics intrinsics = camera.intrinsics;
   RequireOwnSize(intrinsics, image, where);
   const bool has_size = intrinsics.width_px != 0;
@@ -69,7 +62,7 @@ OnPhoto CameraOn(const io::ForeignCamera& camera, const io::SizedImage& image,
   io::Distortion lens = InPixels(intrinsics, width_px, height_px);
   io::RequirePlausibleFocal(lens.params[0], lens.params[1], width_px, height_px, where);
   io::RequirePlausibleCentre(lens.params[2], lens.params[3], width_px, height_px, where);
-  OnPhoto on;
+  PlacedCamera on;
   on.named.name = image.name;
   on.named.cam_from_world = camera.cam_from_world;
   const PinholeCamera full(width_px, height_px, lens.params[0], lens.params[1], lens.params[2],
@@ -102,7 +95,7 @@ std::string ListOf(const std::vector<std::string>& names) {
 // Images and points of the cameras that have a photo. `place`: of a camera of the scene in
 // `placed`.
 std::optional<calib::SfmModel> ModelOf(const io::ForeignScene& scene,
-                                       const std::vector<OnPhoto>& placed,
+                                       const std::vector<PlacedCamera>& placed,
                                        const std::vector<size_t>& place) {
   if (scene.points.empty()) return std::nullopt;
   calib::SfmModel model;
@@ -125,10 +118,8 @@ std::optional<calib::SfmModel> ModelOf(const io::ForeignScene& scene,
   for (const io::ForeignPoint& point : scene.points) {
     std::vector<std::pair<size_t, Eigen::Vector2d>> seen;
     for (const auto& [camera, pixel] : point.seen) {
-      if (place[camera] == kNone) continue;
-      const OnPhoto& on = placed[place[camera]];
-      seen.emplace_back(place[camera], Eigen::Vector2d((pixel.x() + on.shift.x()) * on.scale_x,
-                                                       (pixel.y() + on.shift.y()) * on.scale_y));
+      if (place[camera] == kNotPlaced) continue;
+      seen.emplace_back(place[camera], placed[place[camera]].PhotoPixel(pixel));
     }
     // Of two features of one image on a point the first counts.
     std::stable_sort(seen.begin(), seen.end(),
@@ -154,8 +145,8 @@ PlacedCameras PlaceCameras(io::ForeignScene scene, const std::string& source,
                            const PhotoNames& photos,
                            const std::function<io::SizedImage(const std::string&)>& sized) {
   PlacedCameras out;
-  std::vector<OnPhoto> placed;
-  std::vector<size_t> place(scene.cameras.size(), kNone);
+  std::vector<PlacedCamera> placed;
+  std::vector<size_t> place(scene.cameras.size(), kNotPlaced);
   std::map<std::string, std::string> entry_of;  // by photo
   for (size_t i = 0; i < scene.cameras.size(); ++i) {
     const io::ForeignCamera& camera = scene.cameras[i];
@@ -179,10 +170,12 @@ PlacedCameras PlaceCameras(io::ForeignScene scene, const std::string& source,
     place[i] = placed.size();
     placed.push_back(CameraOn(camera, sized(meant.front()), where));
   }
+  std::string line = SettleConventions(scene, source, place, placed);
+  if (!line.empty()) scene.notes.push_back(std::move(line));
   out.list.unit = scene.unit;
   out.list.world_origin = scene.world_origin;
   out.list.photo_grid = scene.photo_grid;
-  for (const OnPhoto& on : placed) out.list.cameras.push_back(on.named);
+  for (const PlacedCamera& on : placed) out.list.cameras.push_back(on.named);
   out.model = ModelOf(scene, placed, place);
   out.left_out = std::move(scene.left_out);
   out.notes = std::move(scene.notes);

@@ -196,7 +196,9 @@ CalibratedPhotos FromModel(calib::SfmModel model, Given given, const capture::Ca
 
 CalibratedPhotos FromColmapModel(const capture::Capture& capture, const CalibrateOptions& options,
                                  const fs::path& workspace, Progress& progress) {
-  calib::SfmModel model = ReadModelOf(capture, options.poses);
+  std::vector<std::string> notes;
+  calib::SfmModel model = ReadModelOf(capture, options.poses, &notes);
+  for (const std::string& note : notes) progress.Note(note);
   Given given;
   given.first = model.images.empty() ? "" : model.images.front().name;
   CalibratedPhotos calibrated =

@@ -16,6 +16,7 @@
 #include "dtr/io/image_io.h"
 #include "pipeline/detail/cameras/camera_formats.h"
 #include "pipeline/detail/cameras/foreign_cameras.h"
+#include "pipeline/detail/cameras/photo_scale.h"
 #include "pipeline/detail/import/camera_distortion.h"
 #include "pipeline/detail/import/rgbd_files.h"
 #include "pipeline/detail/photos/holdout.h"
@@ -79,8 +80,8 @@ void TellMissing(const fs::path& file, const CameraFileFolders& folders, size_t 
 
 CamerasFromFile FromColmap(const fs::path& folder, const CameraFileFolders& folders) {
   const fs::path model_folder = colmap::ModelFolderIn(folder);
-  calib::SfmModel model = ReadGivenModel(folder);
   CamerasFromFile cameras;
+  calib::SfmModel model = ReadGivenModel(folder, &cameras.notes);
   const size_t all = model.images.size();
   for (calib::SfmImage& image : model.images) image.name = NameBelow(folders.images, image.name);
   std::erase_if(model.images, [&](const calib::SfmImage& image) {
@@ -90,6 +91,14 @@ CamerasFromFile FromColmap(const fs::path& folder, const CameraFileFolders& fold
     return true;
   });
   TellMissing(model_folder, folders, all, cameras);
+  std::map<std::string, StoredSize> sizes;
+  for (const calib::SfmImage& image : model.images) {
+    const io::SizedImage photo = SizedImageAt(folders.images, image.name);
+    sizes[image.name] = {photo.width_px, photo.height_px, photo.exif_orientation};
+  }
+  std::string scaled =
+      ScaleToPhotos(sizes, GridOfModel(model_folder), model_folder.string(), model);
+  if (!scaled.empty()) cameras.notes.push_back(std::move(scaled));
   for (const calib::SfmImage& image : model.images) {
     io::NamedCamera named;
     named.name = image.name;

@@ -6,7 +6,10 @@
 #include <utility>
 #include <vector>
 
+#include "calib/colmap/model_io.h"
 #include "pipeline/detail/cameras/camera_formats.h"
+#include "pipeline/detail/cameras/photo_scale.h"
+#include "pipeline/model_grid.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -47,13 +50,22 @@ void NameAsPhotos(const capture::Capture& capture, io::CameraList& list) {
   Rename(capture, names);
 }
 
-calib::SfmModel ReadModelOf(const capture::Capture& capture, const std::filesystem::path& folder) {
-  calib::SfmModel model = ReadGivenModel(folder);
+calib::SfmModel ReadModelOf(const capture::Capture& capture, const std::filesystem::path& folder,
+                            std::vector<std::string>* notes) {
+  calib::SfmModel model = ReadGivenModel(folder, notes);
   std::vector<std::string*> names;
   for (calib::SfmImage& image : model.images) names.push_back(&image.name);
   Rename(capture, names);
   std::sort(model.images.begin(), model.images.end(),
             [](const auto& a, const auto& b) { return a.name < b.name; });
+  std::map<std::string, StoredSize> sizes;
+  for (const capture::Photo& photo : capture.photos) {
+    sizes[photo.name] = capture::StoredSizeOf(photo);
+  }
+  const std::filesystem::path model_folder = colmap::ModelFolderIn(folder);
+  const std::string line =
+      ScaleToPhotos(sizes, GridOfModel(model_folder), model_folder.string(), model);
+  if (notes != nullptr && !line.empty()) notes->push_back(line);
   return model;
 }
 

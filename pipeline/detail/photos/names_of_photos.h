@@ -2,6 +2,8 @@
 // photos have.
 #pragma once
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "calib/sfm_model.h"
 #include "capture/capture.h"
@@ -13,8 +15,10 @@ namespace dtr::pipeline {
 /// names that end as those of photos do become these where that is one to one. Others stay.
 void NameAsPhotos(const capture::Capture& capture, io::CameraList& list);
 
-/// The COLMAP model in `folder` (ModelFolderIn), its images in byte order of such names. Throws
-/// Error as colmap::ReadModel does.
-calib::SfmModel ReadModelOf(const capture::Capture& capture, const std::filesystem::path& folder);
+/// The COLMAP model in `folder` (ModelFolderIn), its images in byte order of such names, its
+/// cameras on the pixels of the photos (ScaleToPhotos). Throws Error as colmap::ReadModel does.
+/// `notes` gets what reading and scaling say.
+calib::SfmModel ReadModelOf(const capture::Capture& capture, const std::filesystem::path& folder,
+                            std::vector<std::string>* notes = nullptr);
 
 }  // namespace dtr::pipeline

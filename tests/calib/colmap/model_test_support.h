@@ -1,5 +1,6 @@
 // tests/calib/colmap/model_test_support.h -- small models to write and read.
 #pragma once
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -55,6 +56,42 @@ inline calib::SfmModel ModelWithEveryCamera(std::uint64_t seed) {
     model.points[static_cast<std::uint64_t>(7 * i)] = point;
   }
   return model;
+}
+
+/// rigs.* and frames.* of a model whose cameras all stand alone, as COLMAP 3.12 and later write
+/// them: a rig for each camera, a frame for each image. With `binary` as bytes, else as text.
+struct RigsAndFrames {
+  std::string rigs, frames;
+};
+inline RigsAndFrames TrivialFrames(const calib::SfmModel& model, bool binary) {
+  RigsAndFrames files;
+  const auto put = [](std::string& out, const auto& value) {
+    out.append(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  if (binary) put(files.rigs, std::uint64_t{model.cameras.size()});
+  for (const auto& [id, camera] : model.cameras) {
+    if (!binary) files.rigs += fmt::format("{} 1 CAMERA {}\n", id, id);
+    if (!binary) continue;
+    for (const std::uint32_t value : {id, 1u, 0u, id}) put(files.rigs, value);
+  }
+  if (binary) put(files.frames, std::uint64_t{model.images.size()});
+  for (const calib::SfmImage& image : model.images) {
+    const auto& q = image.cam_from_world.rotation;
+    const auto& t = image.cam_from_world.translation;
+    if (!binary) {
+      files.frames +=
+          fmt::format("{} {} {} {} {} {} {} {} {} 1 CAMERA {} {}\n", image.id, image.camera_id,
+                      q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z(), image.camera_id, image.id);
+      continue;
+    }
+    for (const std::uint32_t value : {image.id, image.camera_id}) put(files.frames, value);
+    for (const double value : {q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z()}) {
+      put(files.frames, value);
+    }
+    for (const std::uint32_t value : {1u, 0u, image.camera_id}) put(files.frames, value);
+    put(files.frames, std::uint64_t{image.id});
+  }
+  return files;
 }
 
 /// Equality bit for bit.
