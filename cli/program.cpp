@@ -12,18 +12,21 @@
 #include <filesystem>
 #include <sstream>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "cli/arguments.h"
 #include "cli/command.h"
 #include "cli/option_names.h"
 #include "cli/standard_output.h"
+#include "cli/suggestions.h"
 #include "dtr/base/error.h"
 
 namespace dtr::cli {
 namespace {
 
 int Run(int argc, char** argv) {
-  CLI::App app("dtr -- Depth + Texture Representation: photos in, novel views out");
+  CLI::App app("dtr -- Depth + Texture Representation: photos in, novel views out", "dtr");
   app.set_version_flag("--version", DTR_VERSION);
   app.require_subcommand(1);
   AddCallableCommands(app);
@@ -35,15 +38,16 @@ int Run(int argc, char** argv) {
   AddSelftestCommand(app);
   AddManualCommands(app, DTR_VERSION);
   LearnOptionNames(app);
-  RequirePlainArguments({argv + std::min(argc, 1), argv + argc});
+  std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+  RequirePlainArguments(words);
+  words = WithHelpAsOption(std::move(words));
   // CLI11 would say that a command is missing, not that this one does not exist.
-  const auto is_called = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
-  if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(is_called).empty()) {
-    WriteErr(fmt::format("dtr: no command is called '{}'; see dtr --help\n", argv[1]));
+  if (const std::string unknown = UnknownCommand(app, words); !unknown.empty()) {
+    WriteErr(fmt::format("dtr: {}; see dtr --help\n", unknown));
     return kWrongUsage;
   }
   try {
-    app.parse(argc, argv);
+    app.parse(std::vector<std::string>(words.rbegin(), words.rend()));  // as CLI11 wants them
     return kDone;
   } catch (const CLI::RuntimeError& ended) {
     return ended.get_exit_code();
@@ -53,7 +57,7 @@ int Run(int argc, char** argv) {
     WriteOut(text.str());
     return code;
   } catch (const CLI::ParseError& error) {
-    WriteErr(fmt::format("dtr: {}; see dtr --help\n", error.what()));
+    WriteErr(fmt::format("dtr: {}{}; see dtr --help\n", error.what(), MeantOption(app, words)));
     return kWrongUsage;
   }
 }

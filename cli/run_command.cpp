@@ -7,6 +7,7 @@
 
 #include "cli/arguments.h"
 #include "cli/command.h"
+#include "cli/suggestions.h"
 #include "dtr/base/error.h"
 
 namespace dtr::cli {
@@ -47,10 +48,11 @@ Found CommandOf(CLI::App& app, const std::vector<std::string>& words) {
     if (next == below.end()) {
       std::vector<std::string> names;
       for (const CLI::App* one : below) names.push_back(one->get_name());
+      const std::string typed = found.words < words.size() ? words[found.words] : "";
       throw UsageError(fmt::format(
-          "no command is called '{}'; there are {}",
+          "no command is called '{}'{}; there are {}",
           fmt::join(words.begin(), words.begin() + std::min(found.words + 1, words.size()), " "),
-          fmt::join(names, ", ")));
+          typed.empty() ? "" : DidYouMean(typed, names), fmt::join(names, ", ")));
     }
     found.command = *next;
     ++found.words;
@@ -74,8 +76,8 @@ const CLI::Option* OptionCalled(const CLI::App& command, const std::string& name
     std::replace(known.begin(), known.end(), '-', '_');
     names.push_back(known);
   }
-  throw UsageError(fmt::format("{}: no option is called '{}'; there are {}", command.get_name(),
-                               name, fmt::join(names, ", ")));
+  throw UsageError(fmt::format("{}: no option is called '{}'{}; there are {}", command.get_name(),
+                               name, DidYouMean(name, names), fmt::join(names, ", ")));
 }
 
 // Words of a command line that set the option.

@@ -1,0 +1,128 @@
+#include "cli/suggestions.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <iterator>
+
+namespace dtr::cli {
+namespace {
+
+// Up to so many letters of a word may be wrong, more of a longer one.
+size_t Tolerance(const std::string& typed) { return typed.size() < 4 ? 1 : 1 + typed.size() / 5; }
+
+// Optimal string alignment: insertions, deletions, exchanges, and swaps of neighbours.
+size_t Distance(const std::string& a, const std::string& b) {
+  std::array<std::vector<size_t>, 3> rows;  // two before, one before, current
+  for (auto& row : rows) row.resize(b.size() + 1);
+  for (size_t j = 0; j <= b.size(); ++j) rows[2][j] = j;
+  for (size_t i = 1; i <= a.size(); ++i) {
+    std::rotate(rows.begin(), rows.begin() + 1, rows.end());
+    rows[2][0] = i;
+    for (size_t j = 1; j <= b.size(); ++j) {
+      const size_t exchange = rows[1][j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1);
+      rows[2][j] = std::min({rows[1][j] + 1, rows[2][j - 1] + 1, exchange});
+      const bool swapped = i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1];
+      if (swapped) rows[2][j] = std::min(rows[2][j], rows[0][j - 2] + 1);
+    }
+  }
+  return rows[2].back();
+}
+
+const CLI::App* CommandCalled(const CLI::App& app, const std::string& name) {
+  const auto found = app.get_subcommands(
+      [&](const CLI::App* one) { return !one->get_name().empty() && one->get_name() == name; });
+  return found.empty() ? nullptr : found.front();
+}
+
+// The command that the first words call, and how many they are.
+std::pair<const CLI::App*, size_t> Called(const CLI::App& app,
+                                          const std::vector<std::string>& words) {
+  const CLI::App* command = &app;
+  size_t count = 0;
+  while (count < words.size()) {
+    const CLI::App* const below = CommandCalled(*command, words[count]);
+    if (below == nullptr) break;
+    command = below;
+    ++count;
+  }
+  return {command, count};
+}
+
+// "--name" of all options, those of groups (commands without a name) included.
+void AddOptionNames(const CLI::App& command, std::vector<std::string>& names) {
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  }
+  for (const CLI::App* group :
+       command.get_subcommands([](const CLI::App* one) { return one->get_name().empty(); })) {
+    AddOptionNames(*group, names);
+  }
+}
+
+}  // namespace
+
+std::string Nearest(const std::string& typed, const std::vector<std::string>& candidates) {
+  std::vector<std::string> longer;
+  std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(longer),
+               [&](const std::string& name) { return name.starts_with(typed); });
+  if (longer.size() == 1) return longer.front();
+  std::string nearest;
+  size_t least = Tolerance(typed) + 1;
+  for (const std::string& name : candidates) {
+    const size_t distance = Distance(typed, name);
+    if (distance > least) continue;
+    nearest = distance == least ? "" : name;  // of two that are as near neither is meant surely
+    least = distance;
+  }
+  return nearest;
+}
+
+std::string DidYouMean(const std::string& typed, const std::vector<std::string>& candidates) {
+  const std::string meant = Nearest(typed, candidates);
+  return meant.empty() ? "" : fmt::format("; did you mean '{}'?", meant);
+}
+
+std::vector<std::string> CommandNames(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands({})) {
+    if (!command->get_name().empty()) names.push_back(command->get_name());
+  }
+  return names;
+}
+
+std::vector<std::string> WithHelpAsOption(std::vector<std::string> words) {
+  if (words.empty() || words.front() != "help") return words;
+  words.erase(words.begin());
+  std::erase_if(words, [](const std::string& word) { return word.starts_with('-'); });
+  words.emplace_back("--help");
+  return words;
+}
+
+std::string UnknownCommand(const CLI::App& app, const std::vector<std::string>& words) {
+  const auto [command, count] = Called(app, words);
+  const std::vector<std::string> names = CommandNames(*command);
+  if (names.empty() || count == words.size() || words[count].starts_with('-')) return "";
+  const std::string called = fmt::format(
+      "{}", fmt::join(words.begin(), words.begin() + static_cast<long>(count) + 1, " "));
+  return fmt::format("no command is called '{}'{}", called, DidYouMean(words[count], names));
+}
+
+std::string MeantOption(const CLI::App& app, const std::vector<std::string>& words) {
+  std::vector<std::string> names;
+  AddOptionNames(*Called(app, words).first, names);
+  for (const std::string& word : words) {
+    if (word == "--") break;
+    const std::string name = word.substr(0, word.find('='));
+    if (!name.starts_with("--") || std::find(names.begin(), names.end(), name) != names.end()) {
+      continue;
+    }
+    const std::string meant = Nearest(name, names);
+    return meant.empty() ? "" : fmt::format("; {}: did you mean {}?", name, meant);
+  }
+  return "";
+}
+
+}  // namespace dtr::cli
