@@ -100,12 +100,42 @@ std::vector<Addition> ChooseAdditions(std::vector<Place> places, std::vector<Loo
   return additions;
 }
 
+std::vector<CoarseView> Without(std::span<const CoarseView> views,
+                                const std::vector<Redundant>& redundant) {
+  std::vector<CoarseView> staying(views.begin(), views.end());
+  std::erase_if(staying, [&](const CoarseView& view) {
+    return std::any_of(redundant.begin(), redundant.end(),
+                       [&](const Redundant& one) { return one.name == view.name; });
+  });
+  return staying;
+}
+
+// Per view the name of the nearest one that stays: its own where it does.
+std::vector<std::string> NearestNames(std::span<const CoarseView> views,
+                                      const std::vector<CoarseView>& staying) {
+  std::vector<std::string> names;
+  for (const CoarseView& view : views) {
+    const auto own = std::find_if(staying.begin(), staying.end(),
+                                  [&](const CoarseView& other) { return other.name == view.name; });
+    const auto nearest = std::min_element(
+        staying.begin(), staying.end(), [&](const CoarseView& a, const CoarseView& b) {
+          return (a.CenterInWorld() - view.CenterInWorld()).norm() <
+                 (b.CenterInWorld() - view.CenterInWorld()).norm();
+        });
+    names.push_back((own != staying.end() ? own : nearest)->name);
+  }
+  return names;
+}
+
 }  // namespace
 
 Advice Advise(std::span<const CoarseView> views, const AdviseOptions& options, Progress& progress) {
   if (views.size() < 2) throw std::invalid_argument("Advise: fewer than 2 views");
   Advice advice;
-  advice.places = PlacesAmong(views);
+  advice.redundant = FindRedundant(views, options, progress);
+  // Who is told to leave cameras out must not be asked for another one between them.
+  const std::vector<CoarseView> staying = Without(views, advice.redundant);
+  advice.places = PlacesAmong(views, NearestNames(views, staying));
   const int count = static_cast<int>(advice.places.size());
   progress.Stage("looking from new positions", count);
   std::vector<Look> looks(advice.places.size());
@@ -113,12 +143,11 @@ Advice Advise(std::span<const CoarseView> views, const AdviseOptions& options, P
   ParallelFor(0, count, options.threads, [&](int i) {
     progress.ThrowIfInterrupted();
     const auto at = static_cast<size_t>(i);
-    looks[at] = LookFrom(advice.places[at], views);
+    looks[at] = LookFrom(advice.places[at], staying);
     Measure(looks[at], options, advice.places[at]);
     progress.Update(++done);
   });
   advice.add = ChooseAdditions(advice.places, looks, options, progress);
-  advice.redundant = FindRedundant(views, options, progress);
   return advice;
 }
 

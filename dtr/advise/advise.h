@@ -24,7 +24,7 @@ struct AdviseOptions {
 
 /// A place from which people will look, and what the photos know of what it sees.
 struct Place {
-  std::string where;  ///< "between a.jpg and b.jpg", "beyond a.jpg, away from b.jpg"
+  std::string where;  ///< "between a.jpg and b.jpg", "beyond a.jpg, away from b.jpg", "near a.jpg"
   PinholeCamera camera{1, 1, 1, 1, 0, 0};
   Pose cam_from_world;
 
@@ -48,16 +48,19 @@ struct Redundant {
 };
 
 struct Advice {
-  std::vector<Place> places;         ///< between neighbours, and a step beyond each camera
+  /// Between neighbours, and a step beyond each camera. A redundant one goes by the name of the
+  /// nearest that is none.
+  std::vector<Place> places;
   std::vector<Addition> add;         ///< in this order: each counts those before it as taken
   std::vector<Redundant> redundant;  ///< may all be left out together, in this order
 };
 
-/// Looks from half-way between neighbouring cameras, and from half a step beyond each. The rest is
-/// geometry: nothing is rendered. Cameras to add are chosen one by one where a camera would leave
-/// the fewest poor places, as far as the known surfaces tell what it would see; redundant ones are
-/// taken out one by one, the most covered first. Deterministic. Throws std::invalid_argument for
-/// fewer than 2 views.
+/// Redundant cameras are taken out one by one, the most covered first. Then looks from half-way
+/// between neighbouring cameras, and from half a step beyond each, by what those show that stay: so
+/// all of the advice can be followed together. The rest is geometry: nothing is rendered.
+/// Cameras to add are chosen one by one where a camera would leave
+/// the fewest poor places, as far as the known surfaces tell what it would see. Deterministic.
+/// Throws std::invalid_argument for fewer than 2 views.
 Advice Advise(std::span<const CoarseView> views, const AdviseOptions& options, Progress& progress);
 
 /// Samples along the long side of the coarse views that Advise is meant for.

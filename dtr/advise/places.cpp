@@ -46,7 +46,11 @@ std::vector<size_t> NearestViews(std::span<const CoarseView> views, const Pose& 
   return indices;
 }
 
-std::vector<Place> PlacesAmong(std::span<const CoarseView> views) {
+std::vector<Place> PlacesAmong(std::span<const CoarseView> views,
+                               const std::vector<std::string>& names) {
+  const auto where = [&](const std::string& how, size_t i, const std::string& and_how, size_t j) {
+    return names[i] == names[j] ? "near " + names[i] : how + names[i] + and_how + names[j];
+  };
   std::vector<Place> places;
   std::set<std::pair<size_t, size_t>> pairs;
   for (size_t i = 0; i < views.size(); ++i) {
@@ -57,14 +61,13 @@ std::vector<Place> PlacesAmong(std::span<const CoarseView> views) {
       const CoarseView& other = views[j];
       const Eigen::Vector3d step = view.CenterInWorld() - other.CenterInWorld();
       if (nearest && step.norm() > 0) {
-        places.push_back({"beyond " + view.name + ", away from " + other.name,
-                          SmallCamera(view.camera),
+        places.push_back({where("beyond ", i, ", away from ", j), SmallCamera(view.camera),
                           PoseAt(view.CenterInWorld() + step / 2, view.cam_from_world.rotation)});
         nearest = false;
       }
       if (!pairs.emplace(std::min(i, j), std::max(i, j)).second) continue;
       places.push_back(
-          {"between " + view.name + " and " + other.name, SmallCamera(view.camera),
+          {where("between ", i, " and ", j), SmallCamera(view.camera),
            PoseAt((view.CenterInWorld() + other.CenterInWorld()) / 2,
                   view.cam_from_world.rotation.slerp(0.5, other.cam_from_world.rotation))});
     }

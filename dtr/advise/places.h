@@ -16,7 +16,8 @@ std::vector<size_t> NearestViews(std::span<const CoarseView> views, const Pose& 
                                  size_t count);
 
 /// Half-way between each view and its 3 nearest, each pair once, and half a step from each view
-/// away from its nearest.
-std::vector<Place> PlacesAmong(std::span<const CoarseView> views);
+/// away from its nearest. `names`: what each view is called in Place::where.
+std::vector<Place> PlacesAmong(std::span<const CoarseView> views,
+                               const std::vector<std::string>& names);
 
 }  // namespace dtr::advise

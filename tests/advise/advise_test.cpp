@@ -124,6 +124,21 @@ TEST(Advise, CamerasThatAddNothingMayGoTogether) {
   EXPECT_THAT(strict.redundant, IsEmpty());
 }
 
+// Two rows of cameras that stand close, and a gap between them: what is asked for lies between
+// cameras that stay, and is measured by them.
+TEST(Advise, AsksForNoCameraBetweenTwoThatAddNothing) {
+  const auto views = Row(Plane({0, 0, 1}, kWallZ), {0, 0.01, 0.02, 8, 8.01, 8.02});
+  const Advice advice = AdviseOn(views, {.redundant_share = 0.98});
+  ASSERT_FALSE(advice.redundant.empty());
+  ASSERT_FALSE(advice.add.empty());
+  for (const Redundant& gone : advice.redundant) {
+    for (const Place& place : advice.places) {
+      EXPECT_THAT(place.where, ::testing::Not(HasSubstr(gone.name)));
+    }
+  }
+  EXPECT_THAT(advice.places[advice.add.front().place].where, HasSubstr("between"));
+}
+
 TEST(Advise, IsTheSameForAnyNumberOfThreads) {
   const auto views = Row(Plane({0, 0, 1}, kWallZ), {0, 1, 2, 8, 9, 10});
   const Advice one = AdviseOn(views, {.threads = 1}), three = AdviseOn(views, {.threads = 3});
