@@ -40,7 +40,9 @@ void FolderContents::Use(const std::string& kind) {
 }
 
 std::string LineOf(const FolderContents& contents) {
-  std::string line = "found " + Count(contents.photos, "photo", "photos");
+  const bool of_videos = contents.photos == 0 && contents.videos > 0 && contents.cameras > 0;
+  std::string line = "found " + (of_videos ? Count(contents.videos, "video", "videos")
+                                           : Count(contents.photos, "photo", "photos"));
   if (contents.cameras > 0) line += " of " + Count(contents.cameras, "camera", "cameras");
   if (contents.masks > 0) line += ", " + Count(contents.masks, "mask", "masks");
   const auto is_depth = [](const Ignored& ignored) { return ignored.kind == "depth_maps"; };

@@ -173,6 +173,9 @@ capture::FolderContents ContentsOfRig(const fs::path& folder, const Layout& layo
   const int used = videos ? 0 : static_cast<int>(layout.shots.size());
   if (videos) {
     for (const char* kind : {"videos", "live_photo_videos", "other_files"}) contents.Use(kind);
+    std::set<fs::path> files;
+    for (const Shot& shot : layout.shots) files.insert(shot.file);
+    contents.videos = static_cast<int>(files.size());
   }
   if (contents.photos > used) {
     contents.Ignore("unused_photos", "images", "of no camera of the rig", "",
