@@ -54,7 +54,9 @@ class Walker {
   Walker(const fs::path& top, bool recurse) : top_(top), recurse_(recurse) {}
 
   FolderWalk Finish() {
+    MarkRead(top_);
     List("");
+    while (!links_.empty()) FollowFirstLink();
     std::sort(walk_.images.begin(), walk_.images.end());
     std::sort(walk_.videos.begin(), walk_.videos.end());
     SortVideos();
@@ -65,6 +67,34 @@ class Walker {
   }
 
  private:
+  // False where the folder has been read already: links may lead to one twice, or round in a
+  // circle.
+  bool MarkRead(const fs::path& folder) {
+    std::error_code error;
+    const fs::path real = fs::canonical(folder, error);
+    return read_.insert(error ? folder : real).second;
+  }
+
+  bool HoldsTop(const fs::path& folder) const {
+    std::error_code error;
+    const fs::path real = fs::canonical(folder, error), top = fs::canonical(top_, error);
+    return std::mismatch(real.begin(), real.end(), top.begin(), top.end()).first == real.end();
+  }
+
+  // Links are followed after all else and in the order of their names, so that what they are read
+  // as does not depend on how a folder is listed.
+  void FollowFirstLink() {
+    const std::string name = *links_.begin();
+    links_.erase(links_.begin());
+    if (HoldsTop(top_ / name)) {
+      walk_.skipped.push_back({PrintableName(name), "links to a folder that holds this one"});
+    } else if (MarkRead(top_ / name)) {
+      List(name);
+    } else {
+      walk_.skipped.push_back({PrintableName(name), "links to a folder that is read already"});
+    }
+  }
+
   void List(const std::string& below) {
     std::error_code error;
     fs::directory_iterator entries(below.empty() ? top_ : top_ / below, error);
@@ -95,10 +125,15 @@ class Walker {
     }
     if (!recurse_) return;
     const std::string why_not = WhyNotSearched(path);
-    if (why_not.empty()) {
+    std::error_code ignored;
+    if (!why_not.empty()) {
+      walk_.skipped.push_back({PrintableName(name), why_not});
+    } else if (fs::is_symlink(path, ignored)) {
+      links_.insert(name);
+    } else if (MarkRead(path)) {
       List(name);
     } else {
-      walk_.skipped.push_back({PrintableName(name), why_not});
+      walk_.skipped.push_back({PrintableName(name), "is read already, by a link to it"});
     }
   }
 
@@ -171,6 +206,8 @@ class Walker {
   bool recurse_;
   FolderWalk walk_;
   std::map<std::string, int> others_;
+  std::set<std::string> links_;  // to folders, by name, still to be followed
+  std::set<fs::path> read_;      // folders, without links in their paths
 };
 
 }  // namespace

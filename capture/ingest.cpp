@@ -189,7 +189,6 @@ void Announce(Capture& capture, Progress& progress) {
 
 std::string WhyNotSearched(const fs::path& folder) {
   std::error_code ignored;
-  if (fs::is_symlink(folder, ignored)) return "links to a folder; links are not followed";
   const std::string name = folder.filename().string();
   if (name.ends_with(".dtr") || name.ends_with(".partial") || name.ends_with(".partial.work") ||
       fs::exists(folder / "set.json", ignored)) {

@@ -40,7 +40,7 @@ FolderContents ContentsOf(const std::filesystem::path& folder, bool recurse);
 /// The same by the kinds of files alone: every image counts as a photo.
 FolderContents ContentsOfFiles(const std::filesystem::path& folder, bool recurse);
 
-/// Why a folder below one of photos is not looked into: it is a link, or holds images that we
+/// Why a folder below one of photos is not looked into: it holds images that we
 /// made ourselves (a set, a capture, a workspace, unfinished work). Empty: it is.
 std::string WhyNotSearched(const std::filesystem::path& folder);
 
