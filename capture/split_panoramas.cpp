@@ -139,16 +139,45 @@ Panorama PanoramaOf(const Photo& photo) {
   return panorama;
 }
 
-bool ArePanoramas(Capture& capture, PanoramaUse use) {
+namespace {
+
+// A panorama or two among ordinary photos, or the reverse, are no reason to lose the others: leaves
+// out the kind of which there are clearly fewer. False where there are not.
+bool LeaveOutTheFew(Capture& capture, size_t panoramas, size_t others, Progress* progress) {
+  const bool few_panoramas = 2 * panoramas < others, few_others = 2 * others < panoramas;
+  if (!few_panoramas && !few_others) return false;
+  for (const Photo& photo : capture.photos) {
+    if (StatesPanorama(photo) != few_panoramas) continue;
+    capture.skipped.push_back(
+        {photo.name,
+         few_panoramas ? "is a 360 degree panorama among ordinary photos; panoramas are a capture "
+                         "of their own"
+                       : "is no 360 degree panorama as the others are; ordinary photos are a "
+                         "capture of their own"});
+    if (progress == nullptr) continue;
+    progress->Note("left out: " + photo.name + ": " + capture.skipped.back().reason);
+  }
+  std::erase_if(capture.photos,
+                [&](const Photo& photo) { return StatesPanorama(photo) == few_panoramas; });
+  std::sort(capture.skipped.begin(), capture.skipped.end(),
+            [](const Skipped& a, const Skipped& b) { return a.name < b.name; });
+  capture.contents.photos = static_cast<int>(capture.photos.size());
+  return true;
+}
+
+}  // namespace
+
+bool ArePanoramas(Capture& capture, PanoramaUse use, Progress* progress) {
   if (use == PanoramaUse::kNever) return false;
   const Photo *panorama = nullptr, *other = nullptr;
   std::vector<Remark> remarks;
   const Photo* wide = nullptr;
   int wide_count = 0;
+  size_t panoramas = 0;
   for (const Photo& photo : capture.photos) {
     const bool is = !photo.face && (use == PanoramaUse::kAlways || StatesPanorama(photo));
-    if (is) (void)PanoramaOf(photo);
     (is ? panorama : other) = &photo;
+    panoramas += is;
     if (is || photo.face) continue;
     if (photo.panorama) {
       remarks.push_back({photo.name, fmt::format("states to be a panorama of the projection '{}', "
@@ -156,6 +185,18 @@ bool ArePanoramas(Capture& capture, PanoramaUse use) {
                                                  photo.panorama->projection)});
     } else if (photo.width_px == 2 * photo.height_px) {
       if (wide_count++ == 0) wide = &photo;
+    }
+  }
+  const size_t others = capture.photos.size() - panoramas;
+  // Wide photos that state nothing may be panoramas, too.
+  const bool others_are_wide = 2 * static_cast<size_t>(wide_count) >= others;
+  if (panoramas > 0 && others > 0 && use == PanoramaUse::kAuto && !others_are_wide &&
+      LeaveOutTheFew(capture, panoramas, others, progress)) {
+    return ArePanoramas(capture, use, progress);
+  }
+  for (const Photo& photo : capture.photos) {
+    if (!photo.face && (use == PanoramaUse::kAlways || StatesPanorama(photo))) {
+      (void)PanoramaOf(photo);
     }
   }
   if (panorama != nullptr && other != nullptr) {

@@ -15,10 +15,12 @@ enum class PanoramaUse {
   kNever,   ///< none
 };
 
-/// Whether the photos are panoramas to be split. Throws Error where some are and some are not, and
-/// where one's size is not that of an equirectangular panorama. Adds remarks where photos are twice
-/// as wide as high, or state another projection, and are taken as they are.
-bool ArePanoramas(Capture& capture, PanoramaUse use);
+/// Whether the photos are panoramas to be split. With kAuto, where fewer than half as many photos
+/// are of one kind as of the other, these are moved to `capture.skipped`, and `progress` is told.
+/// Throws Error where some are panoramas and about as many are not, and where one's size is not
+/// that of an equirectangular panorama. Adds remarks where photos are twice as wide as high, or
+/// state another projection, and are taken as they are.
+bool ArePanoramas(Capture& capture, PanoramaUse use, Progress* progress = nullptr);
 
 /// The sphere around a photo. Throws Error naming the photo where its size does not fit.
 Panorama PanoramaOf(const Photo& photo);

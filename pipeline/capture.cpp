@@ -36,7 +36,7 @@ capture::Capture Ingest(const fs::path& source, const capture::VideoOptions& vid
     fs::create_directories(frames);
     photos = capture::IngestVideos(videos, video, frames, progress);
   }
-  if (!capture::ArePanoramas(photos, panoramas)) return photos;
+  if (!capture::ArePanoramas(photos, panoramas, &progress)) return photos;
   const fs::path views = frames_folder() / "views";
   RemoveTree(views);
   return capture::SplitPanoramas(photos, views, video.threads, progress);

@@ -183,7 +183,7 @@ BuildInputs LookAtInputs(const BuildOptions& options, std::optional<SetRig> rig,
   if (inputs.from_video) return inputs;
   inputs.photos = capture::IngestPhotos(
       options.photos, {.threads = options.threads, .memory_gb = memory_gb}, progress);
-  inputs.is_derived = capture::ArePanoramas(inputs.photos, options.panoramas);
+  inputs.is_derived = capture::ArePanoramas(inputs.photos, options.panoramas, &progress);
   if (inputs.is_derived && options.poses.empty()) RequirePanoramaOptions(options);
   if (!inputs.is_derived) TestPhotos(options, inputs, progress);
   return inputs;
