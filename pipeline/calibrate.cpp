@@ -16,10 +16,12 @@
 #include "capture/sfm_images.h"
 #include "dtr/base/error.h"
 #include "dtr/types/panorama.h"
+#include "pipeline/camera_file.h"
 #include "pipeline/detail/cameras/camera_formats.h"
 #include "pipeline/detail/cameras/known_poses.h"
 #include "pipeline/detail/cameras/panorama_poses.h"
 #include "pipeline/detail/photos/exif_focal.h"
+#include "pipeline/detail/photos/known_lens.h"
 #include "pipeline/detail/reports/calibration_json.h"
 #include "pipeline/detail/reports/text.h"
 
@@ -55,8 +57,16 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
   }
   const capture::Capture photos = Subset(capture, in_sfm);
   const CameraGroups groups(photos.photos, options.sfm.camera_per, options.rig || options.lens);
-  const std::vector<colmap::SfmImageInput> inputs = SfmInputs(photos, groups, workspace / "photos");
+  std::vector<colmap::SfmImageInput> inputs = SfmInputs(photos, groups, workspace / "photos");
+  for (colmap::SfmImageInput& input : inputs) {
+    if (!options.lens) break;
+    input.known_lens = LensFor(*options.lens, input.width_px, input.height_px, input.name);
+  }
   colmap::SfmOptions sfm_options = SfmOptionsFor(options);
+  if (options.lens) {
+    sfm_options.intrinsics_are_known = true;
+    sfm_options.lens_model = calib::NameOf(options.lens->model);
+  }
   const bool panoramas = options.rig && calib::HasOneCentre(options.rig->known);
   if (panoramas) {
     sfm_options.intrinsics_are_known = true;
@@ -209,7 +219,10 @@ CalibratedPhotos CalibratePhotos(const capture::Capture& capture, const Calibrat
   checked.held_out.resize(capture.photos.size(), false);
   RequireCalibration(checked.poses, checked.poses_format, checked.sfm);
   if (checked.rig && !calib::HasOneCentre(checked.rig->known)) RejectTurned(capture, "the rig is");
-  if (checked.lens) RejectTurned(capture, "the intrinsics are");
+  if (checked.lens) {
+    RejectTurned(capture, "the intrinsics are");
+    RequireLensOfPhotos(*checked.lens, capture, progress);
+  }
   HintAtFisheye(capture, checked, progress);
   fs::create_directories(workspace);
   CalibratedPhotos calibrated = checked.poses.empty()

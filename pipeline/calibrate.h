@@ -32,9 +32,11 @@ struct CalibrateOptions {
       true;  ///< bundle adjustment after SfM, where held-out observations say that it pays
   /// Cameras of `poses` are adjusted, too, where held-out observations say that it pays.
   bool refine_poses = false;
-  std::optional<calib::LensCamera> lens;  ///< of all photos, known: SfM's own is replaced by it
-  std::optional<SetRig> rig;              ///< took all photos: its lenses, places and scale hold
-  MetreOptions metres;  ///< places and distances to hold while SfM's model is refined
+  /// Of all photos, known: it holds in matching, mapping and after. Photos may have been scaled as
+  /// a whole since it was calibrated; else Error, before any work.
+  std::optional<calib::LensCamera> lens;
+  std::optional<SetRig> rig;  ///< took all photos: its lenses, places and scale hold
+  MetreOptions metres;        ///< places and distances to hold while SfM's model is refined
   /// The name of the photos where SfM's model must determine its cameras, else Error before it is
   /// refined; empty: unset.
   std::string determined = {};

@@ -195,6 +195,11 @@ std::vector<CameraGroup> GroupCameras(const std::vector<SfmImageInput>& images,
     groups[known->second].images.push_back(i);
   }
   for (CameraGroup& group : groups) {
+    if (const auto& known = images[group.images.front()].known_lens) {
+      group.model = known->model;
+      group.params = known->params;
+      continue;
+    }
     std::vector<double> priors;
     for (const size_t i : group.images) {
       if (images[i].focal_prior_px) priors.push_back(*images[i].focal_prior_px);

@@ -48,7 +48,8 @@ struct CameraGroup {
 };
 
 /// Groups by camera_group and size (every photo alone when not `share`), in the order of the first
-/// photo's name. The guess is the median focal prior of the group, no distortion.
+/// photo's name. The guess is the median focal prior of the group, no distortion; a known lens is
+/// taken as it is.
 std::vector<CameraGroup> GroupCameras(const std::vector<SfmImageInput>& images,
                                       calib::CameraModel model, bool share);
 

@@ -26,6 +26,8 @@ struct SfmImageInput {
   /// tell nothing of each other, and are not matched. Empty: of none.
   std::string station = {};
   Eigen::Matrix3d cam_from_station = Eigen::Matrix3d::Identity();  ///< of images with a station
+  /// The camera, where it is known, of the photo's size: all photos of a group have the same.
+  std::optional<calib::LensCamera> known_lens = {};
 };
 
 /// Which pairs of photos are matched in full.
@@ -92,8 +94,8 @@ struct SfmOptions {
   /// whose fx and fy then differ by 0.8 %: more freedom than a sensor of square pixels has.
   std::string lens_model = "RADIAL";
   bool share_intrinsics_within_group = true;
-  /// The priors are exact, with no distortion, and hold: views made of panoramas. Of the engines
-  /// kGlobal and kAuto.
+  /// Known lenses are exact and hold, or else the priors are, with no distortion (views made of
+  /// panoramas): in matching, votes and mapping.
   bool intrinsics_are_known = false;
   /// Other processes work in the folder, which one that was alone has made: nothing of theirs is
   /// touched, and photos that have their size and time count as what they were.

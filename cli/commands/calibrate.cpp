@@ -42,7 +42,10 @@ int RunCalibratePhotos(const CalibrateArguments& options, const Context& context
   auto photos = capture::IngestPhotos(
       options.photos, {.threads = context.common.threads, .memory_gb = options.memory_gb},
       context.console);
-  if (capture::ArePanoramas(photos, capture::PanoramaUse::kAuto)) {
+  for (const capture::Skipped& photo : photos.skipped) {
+    context.console.Note(fmt::format("skipped: {}: {}", photo.name, photo.reason));
+  }
+  if (capture::ArePanoramas(photos, capture::PanoramaUse::kAuto, &context.console)) {
     throw UsageError(fmt::format(
         "{}: holds 360 degree panoramas; split them first: dtr capture {} -o DIR, then dtr "
         "calibrate photos DIR",

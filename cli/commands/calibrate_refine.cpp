@@ -75,10 +75,15 @@ int RunRefine(const CalibrateRefineArguments& options, const Context& context) {
   refine.determined = options.model.string();
   refine.threads = context.common.threads;
   refine.seed = context.common.seed;
+  refine.progress = &context.console;
+  context.console.Stage("bundle adjustment", 0);
   if (!options.lens.empty()) {
     const calib::LensCamera lens = pipeline::ReadLens(options.lens);
     refine.known_lenses.emplace();
-    for (const auto& [id, camera] : model.cameras) refine.known_lenses->emplace(id, lens);
+    for (const auto& [id, camera] : model.cameras) {
+      refine.known_lenses->emplace(id, pipeline::LensFor(lens, camera.width_px, camera.height_px,
+                                                         fmt::format("camera {}", id)));
+    }
   }
   if (metres.any()) {
     const pipeline::RefinedInMetres in_metres = HoldMetres(options, metres, model, refine);

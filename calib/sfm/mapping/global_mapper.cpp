@@ -9,6 +9,7 @@
 #include "calib/sfm/mapping/acceptance.h"
 #include "calib/sfm/mapping/adjust_map.h"
 #include "calib/sfm/mapping/adjust_stations.h"
+#include "calib/sfm/mapping/ideal_graph.h"
 #include "calib/sfm/mapping/map_model.h"
 #include "calib/sfm/mapping/pair_selection.h"
 #include "calib/sfm/mapping/points.h"
@@ -325,6 +326,13 @@ class Mapper {
 
 Mapped MapGlobally(const ViewGraph& graph, const MapOptions& options) {
   CheckGraph(graph);
+  if (options.intrinsics_are_known &&
+      !std::all_of(graph.cameras.begin(), graph.cameras.end(), CanAdjust)) {
+    const ViewGraph ideal = IdealGraph(graph);
+    Mapped mapped = Mapper(ideal, options).Run();
+    PutBackCameras(graph, &mapped.model);
+    return mapped;
+  }
   return Mapper(graph, options).Run();
 }
 

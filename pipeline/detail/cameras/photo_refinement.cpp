@@ -1,5 +1,7 @@
 #include "pipeline/detail/cameras/photo_refinement.h"
 
+#include <fmt/format.h>
+
 #include <chrono>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -10,6 +12,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/machine.h"
+#include "pipeline/camera_file.h"
 #include "pipeline/detail/photos/folder_cameras.h"
 #include "pipeline/detail/photos/input_hash.h"
 #include "pipeline/detail/reports/calibration_json.h"
@@ -25,7 +28,7 @@ constexpr char kRecord[] = "refined.json";  // written last: it stands for a mod
 constexpr char kModel[] = "model";
 constexpr std::uintmax_t kLargestRecordBytes = 16u << 20;
 
-calib::RefineOptions RefineOptionsFor(const CalibrateOptions& options, const Progress& progress) {
+calib::RefineOptions RefineOptionsFor(const CalibrateOptions& options, Progress& progress) {
   calib::RefineOptions refine;
   refine.determined = options.determined;
   refine.advice = options.advice;
@@ -60,7 +63,8 @@ void RefineLenses(const capture::Capture& capture, const CalibrateOptions& optio
   if (options.lens) {
     refine.known_lenses.emplace();
     for (const auto& [id, camera] : out.model.cameras) {
-      refine.known_lenses->emplace(id, *options.lens);
+      refine.known_lenses->emplace(id, LensFor(*options.lens, camera.width_px, camera.height_px,
+                                               fmt::format("camera {}", id)));
     }
   }
   if (options.fixed_intrinsics) refine.known_lenses = out.model.cameras;
