@@ -7,105 +7,27 @@
 #include <map>
 #include <span>
 
+#include "calib/sfm/matching/lens_pair.h"
 #include "dtr/base/parallel_for.h"
 
 namespace dtr::sfm::matching {
 namespace {
 
-// Robust scales in long sides: wide on the grid, whose steps leave errors, then what features have.
-constexpr double kGridScale = 3.0 / 1600, kScale = 1.0 / 1600;
-constexpr int kFocals = 17;
-constexpr double kLowestFocal = 0.4, kHighestFocal = 4;
 constexpr double kK1s[] = {-0.3, -0.18, -0.08, 0, 0.1};
-// Of a fisheye: 180 degrees on the long side are 0.32; coefficients are of the angle.
-constexpr double kLowestFisheye = 0.15, kHighestFisheye = 1.5;
-constexpr double kFisheyeK1s[] = {-0.12, -0.06, 0, 0.06};
+constexpr double kFisheyeK1s[] = {-0.12, -0.06, 0, 0.06};  // of the angle
 constexpr double kFarthestOffAxis = 1.4;  // rad; farther off, the plane z = 1 magnifies 30 times
-// Weak priors keep what matches leave open in the ordinary; noise is in units of the scale.
-constexpr double kPriorNoise = 0.3, kLogFocalDeviation = 0.5, kK1Deviation = 0.15;
 constexpr int kSteps = 25;
-
-// The matches as a lens tells: points on z = 1 and the distance there that is one unit of scale.
-struct Unbending {
-  PointPairs points;
-  std::vector<double> scale;
-  int beyond = 0;  // matches that the lens cannot have seen
-  std::vector<size_t> index;
-};
-
-Unbending Unbend(const VoteLens& lens, const PointPairs& from, double scale) {
-  Unbending to;
-  for (size_t i = 0; i < from.size(); ++i) {
-    double ma = 1, mb = 1;
-    const auto a = Unbent(lens, from.a[i], &ma), b = Unbent(lens, from.b[i], &mb);
-    if (!a || !b) {
-      ++to.beyond;
-      continue;
-    }
-    to.points.Add(*a, *b);
-    to.scale.push_back(scale * std::sqrt(ma * mb));
-    to.index.push_back(i);
-  }
-  return to;
-}
-
-double CostOf(const Unbending& matches, const RelativePose& pose) {
-  const Eigen::Matrix3d e = pose.Essential();
-  double cost = matches.beyond;
-  for (size_t i = 0; i < matches.points.size(); ++i) {
-    const double s = SampsonSquared(e, matches.points.a[i], matches.points.b[i]);
-    const double u = s / (matches.scale[i] * matches.scale[i]);
-    cost += std::isfinite(u) ? RobustCost(u) : 1;
-  }
-  return cost;
-}
-
-struct Posed {
-  RelativePose pose;
-  double cost = std::numeric_limits<double>::infinity();
-};
-
-Posed Refined(const Unbending& matches, const RelativePose& start, double scale, int iterations) {
-  Posed posed;
-  posed.pose = RefinePose(start, matches.points, scale, iterations);
-  posed.cost = CostOf(matches, posed.pose);
-  return posed;
-}
-
-RelativePose FromFundamental(const VotePair& pair, const VoteLens& lens, const Unbending& matches) {
-  if (lens.fisheye) return PoseFromEssential(pair.fundamental, matches.points, {});
-  const Eigen::Vector3d k(lens.focal, lens.focal, 1);
-  return PoseFromEssential(k.asDiagonal() * pair.fundamental * k.asDiagonal(), matches.points, {});
-}
-
-// Costs and poses of a pair over a list of lenses; each is tried from the fundamental matrix and
-// from the pose at the lens before.
-std::vector<Posed> OverLenses(const VotePair& pair, const std::vector<VoteLens>& lenses) {
-  std::vector<Posed> all;
-  for (const VoteLens& lens : lenses) {
-    const Unbending matches = Unbend(lens, pair.points, kGridScale);
-    RelativePose start = FromFundamental(pair, lens, matches);
-    if (!all.empty() && CostOf(matches, all.back().pose) < CostOf(matches, start)) {
-      start = all.back().pose;
-    }
-    all.push_back(Refined(matches, start, kGridScale / lens.focal, 4));
-  }
-  return all;
-}
 
 std::vector<VoteLens> Grid(const VoteOptions& options) {
   std::vector<VoteLens> lenses;
   const bool fisheye = options.fisheye;
-  const double lowest = fisheye ? kLowestFisheye : kLowestFocal;
-  const double step =
-      std::log((fisheye ? kHighestFisheye : kHighestFocal) / lowest) / (kFocals - 1);
   for (const double k1 : fisheye ? std::span<const double>(kFisheyeK1s) : kK1s) {
     if (options.k1_is_fixed && k1 != 0) continue;
     if (options.focal_is_fixed) {
       lenses.push_back({options.prior_focal, k1, fisheye});
       continue;
     }
-    for (int i = 0; i < kFocals; ++i) lenses.push_back({lowest * std::exp(step * i), k1, fisheye});
+    for (const double focal : FocalGrid(fisheye)) lenses.push_back({focal, k1, fisheye});
   }
   return lenses;
 }
@@ -128,10 +50,6 @@ Reduced ReducedOf(const Normal& n) {
   const Eigen::Matrix<double, 5, 2> across = n.h.topRightCorner<5, 2>();
   return {n.h.bottomRightCorner<2, 2>() - across.transpose() * pose.solve(across),
           n.g.tail<2>() - across.transpose() * pose.solve(n.g.head<5>())};
-}
-
-VoteLens Stepped(const VoteLens& lens, double log_focal, double k1) {
-  return {lens.focal * std::exp(log_focal), lens.k1 + k1, lens.fisheye};
 }
 
 Normal NormalOf(const VotePair& pair, const VoteLens& lens, const RelativePose& pose) {
@@ -199,7 +117,7 @@ class Joint {
   double DataCost(const VoteLens& lens, const std::vector<RelativePose>& poses) const {
     double cost = 0;
     for (size_t p = 0; p < pairs_.size(); ++p) {
-      cost += CostOf(Unbend(lens, pairs_[p].points, kScale), poses[p]);
+      cost += CostOf(Unbend({lens, lens}, pairs_[p].points, kScale), poses[p]);
     }
     return cost;
   }
@@ -350,10 +268,12 @@ std::optional<VoteResult> VoteOnLens(const std::vector<VotePair>& pairs,
                                      const VoteOptions& options) {
   if (pairs.empty()) return std::nullopt;
   const std::vector<VoteLens> lenses = Grid(options);
+  std::vector<LensPair> of_pairs;
+  for (const VoteLens& lens : lenses) of_pairs.push_back({lens, lens});
   std::vector<std::vector<Posed>> posed(pairs.size());
   ParallelFor(0, static_cast<int>(pairs.size()), options.threads, [&](int p) {
     if (options.progress != nullptr) options.progress->ThrowIfInterrupted();
-    posed[static_cast<size_t>(p)] = OverLenses(pairs[static_cast<size_t>(p)], lenses);
+    posed[static_cast<size_t>(p)] = OverLenses(pairs[static_cast<size_t>(p)], of_pairs);
   });
   size_t best = 0;
   double best_cost = std::numeric_limits<double>::infinity();

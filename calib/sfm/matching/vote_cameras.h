@@ -19,9 +19,11 @@ inline double BandOf(double long_side_px) { return std::max(4.0 / 1600, 1 / long
 /// Votes (lens_vote.h) on focal length and k1 of every camera, by the pairs whose photos both have
 /// it; cameras of one photo whose priors are the same vote together. At most 40 pairs vote, those
 /// with many matches and parallax; those that one homography explains have no vote on the focal
-/// length. A focal length from EXIF holds unless the vote contradicts it by more than 15 % and
-/// three standard deviations at a clearly lower cost. Updates cameras and focal_is_known of `graph`
-/// and adds to `notes`.
+/// length. Cameras of one photo each may be zoomed one by one: where a focal length of every
+/// photo's own (zoom_vote.h) explains the matches clearly better, each gets its own, and those that
+/// the matches do not determine get the median. A focal length from EXIF holds unless the vote
+/// contradicts it by more than 15 % and three standard deviations at a clearly lower cost. Updates
+/// cameras and focal_is_known of `graph` and adds to `notes`.
 void VoteOnCameras(std::span<const MatchPhoto> photos, std::span<const CoarsePair> pairs,
                    const MatchOptions& options, ViewGraph& graph, std::vector<std::string>& notes);
 

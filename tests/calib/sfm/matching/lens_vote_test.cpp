@@ -4,7 +4,9 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <map>
 
+#include "calib/sfm/matching/zoom_vote.h"
 #include "dtr/base/random.h"
 
 namespace dtr::sfm::matching {
@@ -109,7 +111,37 @@ TEST(LensVote, ItsDeviationTellsThatPhotosDisagree) {
   EXPECT_GT(4 * mixed->log_focal_deviation, std::abs(std::log(mixed->lens.focal / kFocal)));
 }
 
-TEST(LensVote, NoPairsVoteForNothing) { EXPECT_FALSE(VoteOnLens({}, {})); }
+// Two of seven photos zoomed, the others not: each gets its own.
+TEST(ZoomVote, FindsTheFocalLengthOfEveryPhoto) {
+  for (const double zoomed : {0.6 * kFocal, kFocal, 1.33 * kFocal, 2.5 * kFocal}) {
+    const auto vote = VoteOnZoom(Pairs(zoomed), {});
+    ASSERT_TRUE(vote);
+    ASSERT_EQ(vote->photos.size(), 7u);
+    for (const auto& [photo, found] : vote->photos) {
+      const double right = photo >= 5 ? zoomed : kFocal;
+      EXPECT_LT(std::abs(std::log(found.focal / right)), 4 * found.log_deviation) << photo;
+      EXPECT_LT(found.log_deviation, 0.01) << photo;
+    }
+  }
+}
+
+// What a vote on one focal length makes of zoomed photos costs far more than what each has by
+// itself; of photos of one zoom it costs as much.
+TEST(ZoomVote, ACommonFocalLengthOfZoomedPhotosCostsMore) {
+  const auto ratio = [](double zoomed) {
+    const auto pairs = Pairs(zoomed);
+    std::map<int, double> common;
+    for (int photo = 0; photo < 7; ++photo) common[photo] = VoteOnLens(pairs, {})->lens.focal;
+    return VoteOnZoom(pairs, {})->cost / CostOfFocals(pairs, common, {})->cost;
+  };
+  EXPECT_LT(ratio(1.33 * kFocal), 0.5);
+  EXPECT_GT(ratio(kFocal), 0.97);
+}
+
+TEST(LensVote, NoPairsVoteForNothing) {
+  EXPECT_FALSE(VoteOnLens({}, {}));
+  EXPECT_FALSE(VoteOnZoom({}, {}));
+}
 
 }  // namespace
 }  // namespace dtr::sfm::matching

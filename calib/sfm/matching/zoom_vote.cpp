@@ -1,0 +1,371 @@
+#include "calib/sfm/matching/zoom_vote.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "calib/sfm/matching/lens_pair.h"
+#include "dtr/base/parallel_for.h"
+
+namespace dtr::sfm::matching {
+namespace {
+
+constexpr int kZoomSteps = 30, kMaxTurns = 20;
+
+// The photos of the pairs, in order, and the pairs by their places in that.
+struct ZoomGraph {
+  std::vector<int> photos;
+  std::vector<std::pair<size_t, size_t>> ends;
+};
+
+ZoomGraph GraphOf(const std::vector<VotePair>& pairs) {
+  ZoomGraph graph;
+  for (const VotePair& pair : pairs) {
+    graph.photos.insert(graph.photos.end(), {pair.photo_a, pair.photo_b});
+  }
+  std::sort(graph.photos.begin(), graph.photos.end());
+  graph.photos.erase(std::unique(graph.photos.begin(), graph.photos.end()), graph.photos.end());
+  const auto place_of = [&](int photo) {
+    return static_cast<size_t>(std::lower_bound(graph.photos.begin(), graph.photos.end(), photo) -
+                               graph.photos.begin());
+  };
+  for (const VotePair& pair : pairs) {
+    graph.ends.emplace_back(place_of(pair.photo_a), place_of(pair.photo_b));
+  }
+  return graph;
+}
+
+// Costs and poses of every pair for all focal lengths of a grid, row by row of its first photo's.
+struct GridCosts {
+  std::vector<double> focals;
+  std::vector<std::vector<Posed>> pairs;
+  const Posed& At(size_t pair, size_t a, size_t b) const {
+    return pairs[pair][a * focals.size() + b];
+  }
+};
+
+GridCosts CostsOf(const std::vector<VotePair>& pairs, const VoteOptions& options) {
+  GridCosts costs{FocalGrid(options.fisheye), std::vector<std::vector<Posed>>(pairs.size())};
+  std::vector<LensPair> lenses;
+  for (const double a : costs.focals) {
+    for (const double b : costs.focals) {
+      lenses.push_back({{a, 0, options.fisheye}, {b, 0, options.fisheye}});
+    }
+  }
+  ParallelFor(0, static_cast<int>(pairs.size()), options.threads, [&](int p) {
+    if (options.progress != nullptr) options.progress->ThrowIfInterrupted();
+    costs.pairs[static_cast<size_t>(p)] = OverLenses(pairs[static_cast<size_t>(p)], lenses);
+  });
+  return costs;
+}
+
+// Per photo, an index into the grid.
+using Labels = std::vector<size_t>;
+
+double CostOfLabels(const ZoomGraph& graph, const GridCosts& costs, const Labels& labels) {
+  double cost = 0;
+  for (size_t p = 0; p < graph.ends.size(); ++p) {
+    cost += costs.At(p, labels[graph.ends[p].first], labels[graph.ends[p].second]).cost;
+  }
+  return cost;
+}
+
+// Photos take the label that suits their pairs best, in turn, until none changes.
+void TakeTurns(const ZoomGraph& graph, const GridCosts& costs, Labels& labels) {
+  std::vector<std::vector<size_t>> pairs_of(graph.photos.size());
+  for (size_t p = 0; p < graph.ends.size(); ++p) {
+    pairs_of[graph.ends[p].first].push_back(p);
+    pairs_of[graph.ends[p].second].push_back(p);
+  }
+  for (int turn = 0; turn < kMaxTurns; ++turn) {
+    bool changed = false;
+    for (size_t photo = 0; photo < labels.size(); ++photo) {
+      const auto cost_at = [&](size_t label) {
+        double cost = 0;
+        for (const size_t p : pairs_of[photo]) {
+          const auto [a, b] = graph.ends[p];
+          cost += costs.At(p, a == photo ? label : labels[a], b == photo ? label : labels[b]).cost;
+        }
+        return cost;
+      };
+      size_t best = labels[photo];
+      double least = cost_at(best);
+      for (size_t label = 0; label < costs.focals.size(); ++label) {
+        const double cost = cost_at(label);
+        if (!(cost < least)) continue;
+        least = cost;
+        best = label;
+      }
+      changed = changed || best != labels[photo];
+      labels[photo] = best;
+    }
+    if (!changed) return;
+  }
+}
+
+Labels BestLabels(const ZoomGraph& graph, const GridCosts& costs) {
+  Labels best;
+  double least = std::numeric_limits<double>::infinity();
+  for (size_t label = 0; label < costs.focals.size(); ++label) {
+    Labels labels(graph.photos.size(), label);
+    TakeTurns(graph, costs, labels);
+    const double cost = CostOfLabels(graph, costs, labels);
+    if (cost < least) {
+      least = cost;
+      best = std::move(labels);
+    }
+  }
+  return best;
+}
+
+// Normal equations of a pair: pose, both focal lengths, k1.
+struct PairNormal {
+  Eigen::Matrix<double, 8, 8> h = Eigen::Matrix<double, 8, 8>::Zero();
+  Eigen::Matrix<double, 8, 1> g = Eigen::Matrix<double, 8, 1>::Zero();
+  double weights = 0, squares = 0;
+};
+
+PairNormal NormalOf(const VotePair& pair, const LensPair& at, const RelativePose& pose) {
+  constexpr double kStep = 1e-5;
+  PairNormal normal;
+  const PoseDerivatives derivatives(pose);
+  const LensPair nearby[3] = {{Stepped(at.a, kStep, 0), at.b},
+                              {at.a, Stepped(at.b, kStep, 0)},
+                              {Stepped(at.a, 0, kStep), Stepped(at.b, 0, kStep)}};
+  const auto residual = [&](const LensPair& by, size_t i, PoseRow* row, double& scale) {
+    double ma = 1, mb = 1;
+    const auto a = Unbent(by.a, pair.points.a[i], &ma), b = Unbent(by.b, pair.points.b[i], &mb);
+    if (!a || !b) return std::numeric_limits<double>::quiet_NaN();
+    scale = kScale * std::sqrt(ma * mb);
+    return derivatives.Residual(*a, *b, row) / scale;
+  };
+  for (size_t i = 0; i < pair.points.size(); ++i) {
+    PoseRow pose_row;
+    double scale = 1, other = 1;
+    const double r = residual(at, i, &pose_row, scale);
+    if (!std::isfinite(r)) continue;
+    const double root = 1 / (1 + r * r), weight = root * root;
+    if (weight < 1e-3) continue;
+    Eigen::Matrix<double, 8, 1> row;
+    row.head<5>() = pose_row.transpose() / scale;
+    for (int k = 0; k < 3; ++k) {
+      const double moved = residual(nearby[k], i, nullptr, other);
+      row[5 + k] = std::isfinite(moved) ? (moved - r) / kStep : 0;
+    }
+    normal.h.noalias() += weight * row * row.transpose();
+    normal.g += weight * r * row;
+    normal.weights += weight;
+    normal.squares += weight * r * r;
+  }
+  return normal;
+}
+
+// All focal lengths, k1 and poses together; the last unknown is k1.
+class ZoomSolve {
+ public:
+  struct State {
+    std::vector<double> focals;
+    double k1 = 0;
+    std::vector<RelativePose> poses;
+  };
+
+  ZoomSolve(const std::vector<VotePair>& pairs, const ZoomGraph& graph, const VoteOptions& options,
+            State start)
+      : pairs_(pairs), graph_(graph), options_(options), state_(std::move(start)) {
+    start_focals_ = state_.focals;
+    cost_ = Cost(state_);
+  }
+
+  ZoomResult Solve() {
+    double damping = 1e-3;
+    for (int k = 0; k < kZoomSteps && damping < 1e6; ++k) {
+      if (options_.progress != nullptr) options_.progress->ThrowIfInterrupted();
+      const double before = cost_;
+      if (!Step(damping)) {
+        damping *= 10;
+        continue;
+      }
+      damping *= 0.2;
+      if (before - cost_ < 1e-7 * before) break;
+    }
+    ZoomResult result;
+    result.k1 = state_.k1;
+    result.cost = DataCost(state_);
+    const std::vector<double> deviations = Deviations();
+    for (size_t i = 0; i < graph_.photos.size(); ++i) {
+      result.photos[graph_.photos[i]] = {state_.focals[i], deviations[i]};
+    }
+    return result;
+  }
+
+ private:
+  LensPair LensesOf(const State& state, size_t pair) const {
+    const auto [a, b] = graph_.ends[pair];
+    return {{state.focals[a], state.k1, options_.fisheye},
+            {state.focals[b], state.k1, options_.fisheye}};
+  }
+
+  double DataCost(const State& state) const {
+    double cost = 0;
+    for (size_t p = 0; p < pairs_.size(); ++p) {
+      cost += CostOf(Unbend(LensesOf(state, p), pairs_[p].points, kScale), state.poses[p]);
+    }
+    return cost;
+  }
+
+  double Cost(const State& state) const {
+    double squares = std::pow(state.k1 / kK1Deviation, 2);
+    for (size_t i = 0; i < state.focals.size(); ++i) {
+      squares += std::pow(std::log(state.focals[i] / start_focals_[i]) / kLogFocalDeviation, 2);
+    }
+    return DataCost(state) + kPriorNoise * kPriorNoise * squares;
+  }
+
+  // The reduced system of focal lengths and k1 with their priors, poses eliminated.
+  void Reduce(double damping, Eigen::MatrixXd& h, Eigen::VectorXd& g,
+              std::vector<PairNormal>& normals) const {
+    const auto photos = static_cast<long>(graph_.photos.size());
+    const double noise = kPriorNoise * kPriorNoise;
+    const double focal = noise / (kLogFocalDeviation * kLogFocalDeviation);
+    h = focal * Eigen::MatrixXd::Identity(photos + 1, photos + 1);
+    g = Eigen::VectorXd::Zero(photos + 1);
+    for (long i = 0; i < photos; ++i) {
+      const auto at = static_cast<size_t>(i);
+      g[i] = focal * std::log(state_.focals[at] / start_focals_[at]);
+    }
+    h(photos, photos) = noise / (kK1Deviation * kK1Deviation);
+    g[photos] = h(photos, photos) * state_.k1;
+    normals.resize(pairs_.size());
+    ParallelFor(0, static_cast<int>(pairs_.size()), options_.threads, [&](int i) {
+      const auto p = static_cast<size_t>(i);
+      normals[p] = NormalOf(pairs_[p], LensesOf(state_, p), state_.poses[p]);
+    });
+    for (size_t p = 0; p < normals.size(); ++p) {
+      PairNormal& n = normals[p];
+      n.h.diagonal().head<5>() *= 1 + damping;
+      n.h.diagonal().head<5>().array() += 1e-9;
+      AddReduced(n, p, photos, h, g);
+    }
+    for (long i = 0; i <= photos; ++i) {
+      if (i < photos ? options_.focal_is_fixed : options_.k1_is_fixed) Fix(i, h, g);
+    }
+    h.diagonal() *= 1 + damping;
+  }
+
+  void AddReduced(const PairNormal& n, size_t pair, long photos, Eigen::MatrixXd& h,
+                  Eigen::VectorXd& g) const {
+    const auto pose = n.h.topLeftCorner<5, 5>().ldlt();
+    const Eigen::Matrix<double, 5, 3> across = n.h.topRightCorner<5, 3>();
+    const Eigen::Matrix3d reduced =
+        n.h.bottomRightCorner<3, 3>() - across.transpose() * pose.solve(across);
+    const Eigen::Vector3d right = n.g.tail<3>() - across.transpose() * pose.solve(n.g.head<5>());
+    const long at[3] = {static_cast<long>(graph_.ends[pair].first),
+                        static_cast<long>(graph_.ends[pair].second), photos};
+    for (int i = 0; i < 3; ++i) {
+      g[at[i]] += right[i];
+      for (int j = 0; j < 3; ++j) h(at[i], at[j]) += reduced(i, j);
+    }
+  }
+
+  static void Fix(long i, Eigen::MatrixXd& h, Eigen::VectorXd& g) {
+    h.row(i).setZero();
+    h.col(i).setZero();
+    h(i, i) = 1;
+    g[i] = 0;
+  }
+
+  bool Step(double damping) {
+    Eigen::MatrixXd h;
+    Eigen::VectorXd g;
+    std::vector<PairNormal> normals;
+    Reduce(damping, h, g, normals);
+    Eigen::VectorXd step = -h.ldlt().solve(g);
+    if (!step.allFinite()) return false;
+    const long photos = step.size() - 1;
+    const double shorten = std::max(
+        {1.0, step.head(photos).cwiseAbs().maxCoeff() / 0.3, std::abs(step[photos]) / 0.1});
+    step /= shorten;
+    State moved = state_;
+    for (long i = 0; i < photos; ++i) moved.focals[static_cast<size_t>(i)] *= std::exp(step[i]);
+    moved.k1 += step[photos];
+    for (size_t p = 0; p < normals.size(); ++p) {
+      const PairNormal& n = normals[p];
+      const Eigen::Vector3d of_pair(step[static_cast<long>(graph_.ends[p].first)],
+                                    step[static_cast<long>(graph_.ends[p].second)], step[photos]);
+      const Eigen::Matrix<double, 5, 1> right =
+          n.g.head<5>() + n.h.topRightCorner<5, 3>() * of_pair;
+      const Eigen::Matrix<double, 5, 1> move = -n.h.topLeftCorner<5, 5>().ldlt().solve(right);
+      if (move.allFinite()) moved.poses[p] = PoseDerivatives(state_.poses[p]).Moved(move);
+    }
+    const double cost = Cost(moved);
+    if (!(cost < cost_)) return false;
+    state_ = std::move(moved);
+    cost_ = cost;
+    return true;
+  }
+
+  std::vector<double> Deviations() const {
+    Eigen::MatrixXd h;
+    Eigen::VectorXd g;
+    std::vector<PairNormal> normals;
+    Reduce(0, h, g, normals);
+    double weights = 0, squares = 0;
+    for (const PairNormal& n : normals) {
+      weights += n.weights;
+      squares += n.squares;
+    }
+    std::vector<double> deviations(graph_.photos.size(), std::numeric_limits<double>::infinity());
+    if (!(weights > 0)) return deviations;
+    const Eigen::MatrixXd inverse = h.ldlt().solve(Eigen::MatrixXd::Identity(h.rows(), h.cols()));
+    for (size_t i = 0; i < deviations.size(); ++i) {
+      const double variance =
+          inverse(static_cast<long>(i), static_cast<long>(i)) * squares / weights;
+      if (variance >= 0) deviations[i] = std::sqrt(variance);
+    }
+    return deviations;
+  }
+
+  const std::vector<VotePair>& pairs_;
+  const ZoomGraph& graph_;
+  const VoteOptions& options_;
+  State state_;
+  std::vector<double> start_focals_;
+  double cost_ = 0;
+};
+
+}  // namespace
+
+std::optional<ZoomResult> VoteOnZoom(const std::vector<VotePair>& pairs,
+                                     const VoteOptions& options) {
+  if (pairs.empty()) return std::nullopt;
+  const ZoomGraph graph = GraphOf(pairs);
+  const GridCosts costs = CostsOf(pairs, options);
+  const Labels labels = BestLabels(graph, costs);
+  ZoomSolve::State start;
+  for (const size_t label : labels) start.focals.push_back(costs.focals[label]);
+  for (size_t p = 0; p < pairs.size(); ++p) {
+    start.poses.push_back(
+        costs.At(p, labels[graph.ends[p].first], labels[graph.ends[p].second]).pose);
+  }
+  return ZoomSolve(pairs, graph, options, std::move(start)).Solve();
+}
+
+std::optional<ZoomResult> CostOfFocals(const std::vector<VotePair>& pairs,
+                                       const std::map<int, double>& focals,
+                                       const VoteOptions& options) {
+  if (pairs.empty()) return std::nullopt;
+  const ZoomGraph graph = GraphOf(pairs);
+  ZoomSolve::State start;
+  for (const int photo : graph.photos) start.focals.push_back(focals.at(photo));
+  for (size_t p = 0; p < pairs.size(); ++p) {
+    const auto [a, b] = graph.ends[p];
+    const LensPair lenses{{start.focals[a], 0, options.fisheye},
+                          {start.focals[b], 0, options.fisheye}};
+    start.poses.push_back(OverLenses(pairs[p], {lenses}).front().pose);
+  }
+  VoteOptions held = options;
+  held.focal_is_fixed = true;
+  return ZoomSolve(pairs, graph, held, std::move(start)).Solve();
+}
+
+}  // namespace dtr::sfm::matching
