@@ -143,10 +143,13 @@ void Describe(const std::vector<LensCamera>& known_lenses,
 
 void FixLens(const LensFrame& lens, LensFreedom freedom, double* theta, ceres::Problem& problem) {
   if (freedom == LensFreedom::kFixed) problem.SetParameterBlockConstant(theta);
-  if (freedom != LensFreedom::kNoPrincipalPoint) return;
-  const int centre = FocalCount(lens.model);
-  problem.SetManifold(
-      theta, new ceres::SubsetManifold(static_cast<int>(lens.centre.size()), {centre, centre + 1}));
+  if (freedom == LensFreedom::kFixed || FreesPrincipalPoint(freedom)) return;
+  const int centre = FocalCount(lens.model), params = static_cast<int>(lens.centre.size());
+  std::vector<int> held;
+  for (int k = centre; k < (freedom == LensFreedom::kFocal ? params : centre + 2); ++k) {
+    held.push_back(k);
+  }
+  problem.SetManifold(theta, new ceres::SubsetManifold(params, held));
 }
 
 // `robust`: a few steps under a robust loss, to be followed by least squares.
@@ -242,6 +245,8 @@ const char* NameOf(LensFreedom freedom) {
   switch (freedom) {
     case LensFreedom::kFixed:
       return "fixed";
+    case LensFreedom::kFocal:
+      return "focal";
     case LensFreedom::kNoPrincipalPoint:
       return "no-principal-point";
     case LensFreedom::kAll:
@@ -254,6 +259,11 @@ const char* NameOf(LensFreedom freedom) {
       return "tangential-per-image";
   }
   return "";
+}
+
+bool FreesPrincipalPoint(LensFreedom freedom) {
+  return freedom != LensFreedom::kFixed && freedom != LensFreedom::kFocal &&
+         freedom != LensFreedom::kNoPrincipalPoint;
 }
 
 bool IsPerImage(LensFreedom freedom) {

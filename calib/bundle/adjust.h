@@ -13,6 +13,7 @@ namespace dtr::calib {
 /// Which numbers of the lenses may move.
 enum class LensFreedom {
   kFixed,             ///< none: the lenses are known
+  kFocal,             ///< focal lengths alone
   kNoPrincipalPoint,  ///< focal lengths and distortion, as COLMAP does
   kAll,
   /// All, and of radial lenses tangential distortion, too: they become kOpenCv. A lens whose
@@ -25,7 +26,7 @@ enum class LensFreedom {
   kPrincipalPointPerImage,
   kTangentialPerImage,  ///< both of these
 };
-/// "fixed", "no-principal-point", "all", "tangential", "principal-point-per-image",
+/// "fixed", "focal", "no-principal-point", "all", "tangential", "principal-point-per-image",
 /// "tangential-per-image".
 const char* NameOf(LensFreedom freedom);
 
@@ -46,6 +47,8 @@ struct DistancePrior {
 /// some 2 % of the image's long side of the middle, pixels are square to better than 1 %. Where
 /// cameras are given, their own values take the place of the middle and of squares.
 inline constexpr double kKnownPrincipalPointShare = 0.02, kKnownAspectSigma = 0.01;
+/// What observations tell no better than this share of what is known is open.
+inline constexpr double kOpenShare = 0.25;
 
 struct AdjustOptions {
   LensFreedom lens = LensFreedom::kNoPrincipalPoint;
@@ -78,6 +81,8 @@ struct AdjustOptions {
 double PrincipalPointSigmaPx(const LensCamera& lens, const AdjustOptions& options);
 /// Likewise of the logarithm of fy / fx.
 double AspectSigma(const LensCamera& lens, const AdjustOptions& options);
+/// Whether principal points of lenses move.
+bool FreesPrincipalPoint(LensFreedom freedom);
 /// Whether every image has a principal point of its own.
 bool IsPerImage(LensFreedom freedom);
 /// Whether radial lenses get tangential distortion, and whether this is one.

@@ -10,6 +10,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr LensFreedom kFreedoms[] = {LensFreedom::kFixed,
+                                     LensFreedom::kFocal,
                                      LensFreedom::kNoPrincipalPoint,
                                      LensFreedom::kAll,
                                      LensFreedom::kTangential,
@@ -68,6 +69,7 @@ Json JsonOf(const RefineReport& report) {
                                   {"high_px2", c.high_px2},
                                   {"principal_point_sigmas", c.principal_point_sigmas},
                                   {"converged", c.converged}});
+    if (!c.undetermined.empty()) json["candidates"].back()["undetermined"] = c.undetermined;
   }
   if (report.changed) {
     json["sigma_px"] = report.solve.sigma_px;
@@ -98,6 +100,7 @@ RefineReport RefineReportFrom(const Json& json) {
     candidate.high_px2 = NumberOrNan(item.at("high_px2"));
     candidate.principal_point_sigmas = NumberOrNan(item.at("principal_point_sigmas"));
     candidate.converged = item.at("converged").get<bool>();
+    candidate.undetermined = item.value("undetermined", "");
     report.candidates.push_back(std::move(candidate));
   }
   if (!report.changed) return report;

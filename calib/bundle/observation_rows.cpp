@@ -28,10 +28,12 @@ std::vector<int> FreeParams(const LensCamera& lens, LensFreedom freedom) {
   std::vector<int> free;
   const int focals = FocalCount(lens.model);
   for (int k = 0; k < ParameterCount(lens.model); ++k) {
-    const bool centre = k >= focals && k < focals + 2;
-    if (freedom != LensFreedom::kFixed && !(freedom == LensFreedom::kNoPrincipalPoint && centre)) {
-      free.push_back(k);
-    }
+    const bool focal = k < focals, centre = !focal && k < focals + 2;
+    const bool is_free = focal ? freedom != LensFreedom::kFixed
+                         : centre
+                             ? FreesPrincipalPoint(freedom)
+                             : freedom != LensFreedom::kFixed && freedom != LensFreedom::kFocal;
+    if (is_free) free.push_back(k);
   }
   return free;
 }

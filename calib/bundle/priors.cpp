@@ -207,8 +207,7 @@ double PriorSquares(const std::vector<LensCamera>& known_lenses, const Bundle& b
 }
 
 double PrincipalPointSigmaPx(const LensCamera& lens, const AdjustOptions& options) {
-  if (!(options.principal_point_share > 0) || options.lens == LensFreedom::kFixed ||
-      options.lens == LensFreedom::kNoPrincipalPoint) {
+  if (!(options.principal_point_share > 0) || !FreesPrincipalPoint(options.lens)) {
     return std::numeric_limits<double>::infinity();
   }
   return options.principal_point_share * std::max(lens.width_px, lens.height_px);

@@ -5,11 +5,14 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "calib/bundle/covariance.h"
 #include "calib/bundle/held_out.h"
+#include "calib/bundle/undetermined.h"
 #include "dtr/base/error.h"
 #include "dtr/base/order_statistics.h"
 #include "dtr/base/parallel_for.h"
@@ -27,6 +30,9 @@ constexpr double kMinGainPerImage = 0.01;
 constexpr std::array kRisingFreedom{LensFreedom::kNoPrincipalPoint, LensFreedom::kAll,
                                     LensFreedom::kTangential, LensFreedom::kPrincipalPointPerImage,
                                     LensFreedom::kTangentialPerImage};
+// Of a lens for every image, which has its principal point by itself already.
+constexpr std::array kRisingFreedomOfEach{LensFreedom::kFocal, LensFreedom::kNoPrincipalPoint,
+                                          LensFreedom::kAll, LensFreedom::kTangential};
 
 constexpr size_t kNoneConverged = ~size_t{0}, kNoScale = kNoneConverged - 1;
 // Errors of features that lie near each other go together, so predicted ones are still small.
@@ -43,6 +49,8 @@ AdjustOptions SolveOptions(const RefineOptions& options, const std::optional<Len
   adjust.threads = options.threads;
   if (adjust.fix_poses) return adjust;
   adjust.aspect_sigma = kKnownAspectSigma;
+  // Principal points of their own for all images make a solve nearly projective.
+  if (options.separate_lenses) adjust.principal_point_share = kKnownPrincipalPointShare;
   adjust.positions = options.positions;
   adjust.distances = options.distances;
   return adjust;
@@ -71,19 +79,54 @@ double PrincipalPointSigmas(const Bundle& bundle, const RefineOptions& refine) {
   return most;
 }
 
-// Whether more freedom than the chosen candidate's is worth it: beyond chance, and for a number
-// that every image has by itself beyond what is too little to matter.
-bool IsWorthIt(const RefineCandidate& candidate, const RefineCandidate& chosen) {
+using Losses = std::vector<double>;  // per held-out point
+
+/// Every second one, from the first or the second on.
+Losses EverySecond(const Losses& losses, size_t first) {
+  Losses some;
+  for (size_t i = first; i < losses.size(); i += 2) some.push_back(losses[i]);
+  return some;
+}
+
+/// Whether numbers that every image has by itself explain held-out points better beyond what is too
+/// little to matter, and beyond chance both by the points that choose and by others that confirm.
+bool IsConfirmed(const Losses& candidate, const Losses& chosen, std::uint64_t seed) {
+  for (const size_t half : {0, 1}) {
+    const Losses of_candidate = EverySecond(candidate, half), of_chosen = EverySecond(chosen, half);
+    if (!(BootstrapOfDifference(of_candidate, of_chosen, seed).second < 0)) return false;
+  }
+  return std::sqrt(Mean(candidate)) < (1 - kMinGainPerImage) * std::sqrt(Mean(chosen));
+}
+
+/// Whether more freedom than the chosen candidate's is worth it: beyond chance, and of numbers that
+/// every image has by itself as above.
+bool IsWorthIt(const RefineCandidate& candidate, const RefineCandidate& chosen,
+               const Losses& losses, const Losses& losses_of_chosen, const RefineOptions& options) {
+  if (options.separate_lenses) return IsConfirmed(losses, losses_of_chosen, options.seed);
   if (!(candidate.high_px2 < 0)) return false;
   const bool newly_per_image = IsPerImage(*candidate.lens) && !IsPerImage(*chosen.lens);
   return !newly_per_image || candidate.held_out_px < (1 - kMinGainPerImage) * chosen.held_out_px;
 }
 
+/// What a solve of these points with a lens for every image leaves undetermined of the terms that
+/// the candidate frees; empty: nothing.
+std::string UndeterminedBy(const Bundle& bundle, const RefineCandidate& candidate,
+                           const RefineOptions& refine) {
+  const AdjustOptions options = SolveOptions(refine, candidate.lens);
+  const Adjusted adjusted = Adjust(bundle, options);
+  if (!adjusted.converged) return "all: the solve does not converge";
+  const BundleCovariance covariance = CovarianceOf(adjusted, options);
+  if (!covariance.computed) return "unknown: there are too many photos to tell";
+  if (!covariance.determined) return covariance.weakest;
+  return UndeterminedTerm(adjusted, covariance, options);
+}
+
 std::vector<RefineCandidate> CandidatesFor(const Bundle& bundle, bool separate_lenses) {
   std::vector<RefineCandidate> candidates{{"as given", {}, 0, 0, 0}};
-  for (const LensFreedom freedom : kRisingFreedom) {
-    // A lens for every image has its principal point already.
-    if (IsPerImage(freedom) && separate_lenses) continue;
+  const std::span<const LensFreedom> rising =
+      separate_lenses ? std::span<const LensFreedom>(kRisingFreedomOfEach)
+                      : std::span<const LensFreedom>(kRisingFreedom);
+  for (const LensFreedom freedom : rising) {
     if (IsTangential(freedom) &&
         std::none_of(bundle.lenses.begin(), bundle.lenses.end(), MayGetTangential)) {
       continue;
@@ -117,13 +160,29 @@ Adjusted Train(const Bundle& fold, AdjustOptions options, const Adjusted* less) 
   return Adjust(start, options);
 }
 
+// Counts the solves of a refinement: of every candidate each fold, and that of all observations.
+class SolveCount {
+ public:
+  SolveCount(Progress* progress, size_t solves) : progress_(progress) {
+    if (progress_ != nullptr) progress_->Stage("bundle adjustment", static_cast<int>(solves));
+  }
+  // May be called from any thread.
+  void Done() {
+    if (progress_ != nullptr) progress_->Update(++done_);
+  }
+
+ private:
+  Progress* progress_;
+  std::atomic<int> done_ = 0;
+};
+
 /// What each candidate's cameras, adjusted to half of the points, make of the other half; per
 /// candidate and point. The model as given has seen them all and cannot be compared with candidates
 /// that have not: it is first by name only.
-std::vector<std::vector<double>> TryOnUnseenPoints(const Bundle& bundle,
-                                                   const RefineOptions& options, double scale_px,
-                                                   std::vector<RefineCandidate>& candidates) {
+std::vector<Losses> TryOnUnseenPoints(const Bundle& bundle, const RefineOptions& options,
+                                      double scale_px, std::vector<RefineCandidate>& candidates) {
   const std::vector<PointFold> folds = PointFolds(bundle, options.seed);
+  SolveCount count(options.progress, candidates.size() * folds.size() + 1);
   std::vector<std::vector<double>> parts(candidates.size() * folds.size());
   std::vector<char> converged(parts.size());
   const int folds_at_once = static_cast<int>(folds.size());
@@ -139,9 +198,10 @@ std::vector<std::vector<double>> TryOnUnseenPoints(const Bundle& bundle,
       const size_t at = k * folds.size() + static_cast<size_t>(i);
       converged[at] = trained[k].converged;
       parts[at] = LossesOfHeldOutPoints(trained[k].bundle, fold.asked, scale_px);
+      count.Done();
     }
   });
-  std::vector<std::vector<double>> losses(candidates.size());
+  std::vector<Losses> losses(candidates.size());
   for (size_t i = 0; i < parts.size(); ++i) {
     const size_t k = i / folds.size();
     losses[k].insert(losses[k].end(), parts[i].begin(), parts[i].end());
@@ -155,8 +215,8 @@ std::vector<std::vector<double>> TryOnUnseenPoints(const Bundle& bundle,
 
 /// Whether cameras that were adjusted to half of the points predict the other half better than the
 /// cameras as given, which have seen none.
-bool BeatsGiven(const std::vector<std::vector<double>>& losses, size_t chosen,
-                const RefineOptions& options, Refined& refined) {
+bool BeatsGiven(const std::vector<Losses>& losses, size_t chosen, const RefineOptions& options,
+                Refined& refined) {
   refined.given_px = refined.candidates[0].held_out_px;
   refined.adjusted_px = refined.candidates[chosen].held_out_px;
   refined.held_out_observations = static_cast<int>(losses[chosen].size());
@@ -184,8 +244,14 @@ size_t Choose(const Bundle& bundle, const ObservationSplit& split, const RefineO
       std::tie(candidate.low_px2, candidate.high_px2) =
           BootstrapOfDifference(losses[i], losses[chosen], options.seed);
     }
-    bool better = chosen == 0 || IsWorthIt(candidate, candidates[chosen]);
-    if (!better && candidate.lens == LensFreedom::kAll && !(candidate.low_px2 > 0)) {
+    bool better =
+        chosen == 0 || IsWorthIt(candidate, candidates[chosen], losses[i], losses[chosen], options);
+    if (better && options.separate_lenses && chosen > 0) {
+      candidate.undetermined = UndeterminedBy(some, candidate, options);
+      better = candidate.undetermined.empty();
+    }
+    if (!better && !options.separate_lenses && candidate.lens == LensFreedom::kAll &&
+        !(candidate.low_px2 > 0)) {
       // A principal point off its place is nearly a turn of all cameras, which unseen points hardly
       // tell; what all observations together say of it is known by its covariance.
       candidate.principal_point_sigmas = PrincipalPointSigmas(some, options);
@@ -211,7 +277,7 @@ size_t Choose(const Bundle& bundle, const ObservationSplit& split, const RefineO
   // than a lens's usual freedom points that were not adjusted to have shown already that it is
   // worth it; observations that both models were adjusted to must not contradict.
   const auto [low, high] = BootstrapOfDifference(adjusted, given, options.seed);
-  const bool is_shown = candidates[chosen].lens != LensFreedom::kNoPrincipalPoint;
+  const bool is_shown = chosen > 1;
   return high < 0 || (is_shown && low <= 0) ? chosen : 0;
 }
 

@@ -29,8 +29,9 @@ struct RefineOptions {
   /// What helps where it does not; empty: more views, or a camera that is known.
   std::string advice = {};
   int threads = 0;
-  std::uint64_t seed = 0;              ///< of the observations that are held out
-  const Progress* progress = nullptr;  ///< AdjustOptions::progress of every solve
+  std::uint64_t seed = 0;  ///< of the observations that are held out
+  /// AdjustOptions::progress of every solve; told of each, too, as a stage. Null: nobody.
+  Progress* progress = nullptr;
 };
 
 /// A way to refine, and what it does to observations it has not seen.
@@ -42,6 +43,9 @@ struct RefineCandidate {
   /// less freedom, in px^2; points drawn with replacement.
   double low_px2 = 0, high_px2 = 0;
   bool converged = false;  ///< else it is not taken
+  /// Of lenses of one image each: the terms that its solve leaves undetermined, and how far; then
+  /// it is not taken. Empty: none, or it was no better anyway.
+  std::string undetermined = {};
   /// How surely the principal point is not where it was given, in standard deviations; 0 where
   /// nobody asked: unseen points told already.
   double principal_point_sigmas = 0;
@@ -71,9 +75,13 @@ struct Refined : RefineReport {
 /// the principal point, with it, with tangential distortion, and with a principal point for every
 /// image (stabilised lenses), and tried on the other half, and the other way round: more is freed
 /// only if that explains unseen points better beyond the bootstrap interval, and for numbers that
-/// every image has by itself by 1 % at least. The chosen way is then run on all observations, as
-/// structure from motion was; the result is taken only if its cameras predict one observation of
-/// each point from the others better than the cameras as given, beyond the bootstrap interval.
+/// every image has by itself by 1 % at least. With a lens for every image (separate_lenses) its
+/// focal length is free first; its distortion, then its principal point are freed only where points
+/// that chose and points that did not are both explained better, principal points being known to 2
+/// % of the image, and where the solve determines what was freed. The chosen way is then run on all
+/// observations, as structure from motion was; the result is taken only if its cameras predict one
+/// observation of each point from the others better than the cameras as given, beyond the bootstrap
+/// interval.
 ///
 /// With known lenses, poses and points are adjusted to them without being asked whether it pays;
 /// with known positions or distances, the lenses' freedom is chosen as above, and the result taken

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "calib/bundle/parts.h"
@@ -27,25 +28,27 @@ AdjustOptions AllFree() {
 
 // What of lenses the observations do not determine well beyond what was known before.
 std::vector<Degeneracy> OpenIntrinsics(const Adjusted& fresh, const BundleCovariance& covariance,
-                                       const AdjustOptions& options) {
-  constexpr double kOpen = 0.25;  // of what was known
+                                       const AdjustOptions& options, std::vector<int>& centres) {
   std::vector<Degeneracy> open;
   for (size_t i = 0; i < fresh.bundle.lenses.size(); ++i) {
     const LensCamera& lens = fresh.bundle.lenses[i];
     const Eigen::MatrixXd variance = covariance.OfLens(fresh.bundle, static_cast<int>(i));
     const auto add = [&](const char* name, const std::string& what, double sigma, double known,
                          const char* unit) {
-      if (sigma <= kOpen * known) return;
+      if (sigma <= kOpenShare * known) return false;
       open.push_back({name,
                       fmt::format("the observations determine {} of camera {} to {:.2g}{} at best, "
                                   "as on an orbit at one height; the stored one is taken as right",
                                   what, i + 1, sigma, unit),
                       false});
+      return true;
     };
     const long at = FocalCount(lens.model);
-    add("open_principal_point", "the principal point",
-        RootOfVariance(std::max(variance(at, at), variance(at + 1, at + 1))),
-        PrincipalPointSigmaPx(lens, options), " px");
+    const bool open_centre =
+        add("open_principal_point", "the principal point",
+            RootOfVariance(std::max(variance(at, at), variance(at + 1, at + 1))),
+            PrincipalPointSigmaPx(lens, options), " px");
+    if (open_centre) centres.push_back(static_cast<int>(i));
     const double known = AspectSigma(lens, options);
     if (!std::isfinite(known)) continue;
     const Eigen::Vector2d by(-1 / lens.params[0], 1 / lens.params[1]);
@@ -93,7 +96,12 @@ FreshSolves SolveAfresh(const Bundle& stored, const Halves& halves, int threads,
   FreshSolves free = SolveWith(stored, halves, options, threads);
   if (!free.covariance.computed) return free;
   const bool usable = free.covariance.determined && free.solved[0].converged;
-  if (usable) free.open = OpenIntrinsics(free.solved[0], free.covariance, options);
+  if (usable) {
+    free.open = OpenIntrinsics(free.solved[0], free.covariance, options, free.open_centres);
+  } else {
+    free.open_centres.resize(stored.lenses.size());
+    std::iota(free.open_centres.begin(), free.open_centres.end(), 0);
+  }
   if (usable && free.open.empty()) return free;
   const auto holds = [&](const char* name) {
     return !usable || std::any_of(free.open.begin(), free.open.end(),
@@ -103,6 +111,7 @@ FreshSolves SolveAfresh(const Bundle& stored, const Halves& halves, int threads,
   if (holds("open_aspect_ratio")) options.aspect_sigma = kHeldAspectSigma;
   FreshSolves held = SolveWith(stored, halves, options, threads);
   held.open = std::move(free.open);
+  held.open_centres = std::move(free.open_centres);
   if (!usable && held.covariance.determined && held.solved[0].converged) {
     held.open.push_back({"open_principal_point",
                          "the observations do not determine the principal point, as on an orbit at "

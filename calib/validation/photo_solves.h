@@ -33,6 +33,7 @@ struct FreshSolves {
   Adjusted solved[3];            ///< all points, two halves
   BundleCovariance covariance;   ///< of all points
   std::vector<Degeneracy> open;  ///< what of the lenses was held, as the observations leave it open
+  std::vector<int> open_centres;  ///< lenses whose principal points are among that
 };
 
 /// Solves for all from `stored`, everything free. What the observations leave open they leave to

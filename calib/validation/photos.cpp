@@ -1,20 +1,24 @@
 #include "calib/validation/photos.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "calib/bundle/lens_params.h"
 #include "calib/bundle/moved.h"
 #include "calib/bundle/parts.h"
+#include "calib/bundle/undetermined.h"
 #include "calib/distributions.h"
 #include "calib/validation/image_shift.h"
 #include "calib/validation/photo_patterns.h"
 #include "calib/validation/photo_solves.h"
 #include "dtr/base/error.h"
+#include "dtr/base/order_statistics.h"
 #include "dtr/base/random.h"
 
 namespace dtr::calib {
@@ -227,6 +231,51 @@ void AddDegeneracies(PhotosValidation& validation) {
       AtMost("degeneracies", harmful, 0, reason.empty() ? "none that matters" : reason));
 }
 
+// Principal points that differ from photo to photo by more than cameras do were freed for each of
+// them: where the observations leave them open, nothing but that solve says that they are right,
+// and focal lengths and poses are as wrong as they are.
+void AddUndeterminedTerms(const Bundle& stored, const FreshSolves& solves,
+                          const BundleLimits& limits, PhotosValidation& validation) {
+  std::map<std::pair<int, int>, std::vector<int>> by_size;
+  for (size_t i = 0; i < stored.lenses.size(); ++i) {
+    const LensCamera& lens = stored.lenses[i];
+    by_size[{lens.width_px, lens.height_px}].push_back(static_cast<int>(i));
+  }
+  std::vector<std::string> names;
+  double farthest_px = 0;
+  for (const int lens : solves.open_centres) {
+    const LensCamera& own = stored.lenses[static_cast<size_t>(lens)];
+    const auto& alike = by_size.at({own.width_px, own.height_px});
+    const auto at = static_cast<size_t>(FocalCount(own.model));
+    const double usual_px = kKnownPrincipalPointShare * std::max(own.width_px, own.height_px);
+    Eigen::Vector2d off_px;
+    for (const size_t axis : {0, 1}) {
+      std::vector<double> centres;
+      for (const int other : alike) {
+        centres.push_back(stored.lenses[static_cast<size_t>(other)].params[at + axis]);
+      }
+      off_px[static_cast<long>(axis)] = own.params[at + axis] - UpperMedian(centres);
+    }
+    if (off_px.norm() <= usual_px) continue;
+    names.push_back(NameOfLens(stored, lens));
+    farthest_px = std::max(farthest_px, off_px.norm());
+  }
+  if (limits.lenses_are_given) names.clear();
+  constexpr size_t kNamed = 5;
+  const size_t named = std::min(kNamed, names.size());
+  validation.tests.push_back(
+      AtMost("undetermined_terms", static_cast<double>(names.size()), 0,
+             names.empty()
+                 ? "no term of a camera was freed that the observations leave open"
+                 : fmt::format(
+                       "principal points of {}{}: freed photo by photo, up to {:.3g} px apart from "
+                       "the usual one, and the observations leave them open",
+                       fmt::join(names.begin(), names.begin() + static_cast<long>(named), ", "),
+                       names.size() > named ? fmt::format(" and {} more", names.size() - named)
+                                            : std::string(),
+                       farthest_px)));
+}
+
 void AddImage(const BundleLimits& limits, PhotosValidation& validation) {
   const PhotoValidation* worst = nullptr;
   for (const PhotoValidation& camera : validation.cameras) {
@@ -323,6 +372,7 @@ PhotosValidation ValidatePart(const Bundle& given, const BundleLimits& limits, i
   validation.degeneracies.insert(validation.degeneracies.end(), solves.open.begin(),
                                  solves.open.end());
   AddDegeneracies(validation);
+  AddUndeterminedTerms(stored, solves, limits, validation);
   if (!covariance.computed) {
     return NotValidated(
         validation,

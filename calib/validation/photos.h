@@ -34,6 +34,9 @@ struct BundleLimits {
   double min_p = 1e-4;                      ///< less likely by chance than this is no chance
   int max_unknowns = kMaxUnknowns;          ///< of a bundle that is validated in one part
   double max_focal_share = kMaxFocalShare;  ///< standard deviation of a focal length over itself
+  /// The lenses were calibrated apart (a rig, a lens that was given): what the observations leave
+  /// open of them is none the less known.
+  bool lenses_are_given = false;
 };
 
 /// What of a difference is too little to matter, where an observation's coordinate has `sigma_px`.
@@ -77,7 +80,9 @@ struct PhotosValidation {
 ///  - two halves of the points, split by chance, are solved apart and compared; where they differ
 ///    by more than predicted, all uncertainties are widened by that factor;
 ///  - the covariance is carried to a third view's pixels (TransferCovariance);
-///  - degeneracies are looked for by name;
+///  - degeneracies are looked for by name, and principal points that were freed photo by photo
+///  where
+///    the observations leave them open (undetermined_terms);
 ///  - residuals are checked against patterns of the lens (lens_patterns.h) and a shutter that reads
 ///    row by row (shutter.h).
 /// Some 4000 points, drawn by their index, take part, and all of photos that would be left few.

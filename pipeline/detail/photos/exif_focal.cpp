@@ -38,8 +38,7 @@ Attempt Refined(const SfmRun& run, const CalibrateOptions& options, const colmap
   return attempt;
 }
 
-std::string WhyUndetermined(const SfmRun& run, const calib::SfmModel& model,
-                            const Progress& progress) {
+std::string WhyUndetermined(const SfmRun& run, const calib::SfmModel& model, Progress& progress) {
   calib::RefineOptions refine;
   refine.threads = run.options.threads;
   refine.seed = run.options.seed;
