@@ -40,11 +40,13 @@ void AddViews(const BoardPhotos& photos, const calib::BoardSolution& solution,
 }  // namespace
 
 calib::Calibration CalibrateBoard(const calib::Board& board, const BoardPhotos& photos,
-                                  const std::string& name, const BoardCalibrationOptions& options) {
+                                  const std::string& name, const BoardCalibrationOptions& options,
+                                  Progress& progress) {
   calib::Calibration calibration;
   calibration.board = board;
   calib::BoardSolution solution;
   if (options.model) {
+    progress.Stage("solving for the camera", 0);
     solution = calib::SolveBoard(board, photos.views, photos.width_px, photos.height_px,
                                  *options.model, options.solve);
   } else {
@@ -52,6 +54,7 @@ calib::Calibration CalibrateBoard(const calib::Board& board, const BoardPhotos& 
     choose.solve = options.solve;
     choose.threads = options.threads;
     choose.seed = options.seed;
+    choose.progress = &progress;
     const calib::ModelChoice choice =
         calib::ChooseModel(board, photos.views, photos.width_px, photos.height_px, choose);
     calibration.models = TriedModels(choice);

@@ -18,9 +18,11 @@ struct BoardCalibrationOptions {
   std::uint64_t seed = 0;
 };
 
-/// Solves for the camera `name` behind the photos. Throws Error as SolveBoard and ChooseModel do.
+/// Solves for the camera `name` behind the photos; `progress` is told of the solves that choose the
+/// model, and asked whether to stop. Throws Error as SolveBoard and ChooseModel do.
 calib::Calibration CalibrateBoard(const calib::Board& board, const BoardPhotos& photos,
-                                  const std::string& name, const BoardCalibrationOptions& options);
+                                  const std::string& name, const BoardCalibrationOptions& options,
+                                  Progress& progress);
 
 /// Writes the calibration by the name's extension (any case): .json ours, .yml and .yaml OpenCV's,
 /// .txt COLMAP's cameras.txt with the camera's index + 1 as its id.

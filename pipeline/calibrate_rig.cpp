@@ -27,7 +27,7 @@ struct Inputs {
 
 // Each camera with its model: given, named, or chosen by this camera's own held-out views.
 Inputs InputsOf(const calib::Board& board, const RigPhotos& photos,
-                const RigCalibrationOptions& options) {
+                const RigCalibrationOptions& options, Progress& progress) {
   Inputs all;
   std::vector<calib::RigCameraInput>& inputs = all.cameras;
   all.scores.resize(photos.cameras.size());
@@ -58,11 +58,15 @@ Inputs InputsOf(const calib::Board& board, const RigPhotos& photos,
       choose.solve = options.solve;
       choose.threads = options.threads;
       choose.seed = options.seed;
+      choose.progress = &progress;
+      choose.stage = "choosing the camera model of " + camera.name;
       try {
         auto choice = calib::ChooseModel(board, ViewsOf(photos, c), camera.width_px,
                                          camera.height_px, choose);
         model = choice.scores[choice.chosen].model;
         all.scores[c] = std::move(choice.scores);
+      } catch (const Interrupted&) {
+        throw;
       } catch (const Error& error) {
         throw Error(fmt::format("camera {}: {}", camera.name, error.what()));
       }
@@ -133,12 +137,14 @@ void RequireGiven(const RigPhotos& photos, const RigCalibrationOptions& options)
 }  // namespace
 
 calib::Calibration CalibrateRig(const calib::Board& board, const RigPhotos& photos,
-                                const RigCalibrationOptions& options, RigSummary* summary) {
+                                const RigCalibrationOptions& options, RigSummary* summary,
+                                Progress& progress) {
   RequireGiven(photos, options);
   calib::RigOptions rig_options;
   rig_options.solve = options.solve;
+  rig_options.solve.progress = &progress;
   rig_options.free_lenses = !options.fixed_lenses && options.given.empty();
-  Inputs inputs = InputsOf(board, photos, options);
+  Inputs inputs = InputsOf(board, photos, options, progress);
   const calib::FreeRunning solved =
       Solve(board, photos, inputs, options.free_running, rig_options, *summary);
   if (!options.free_running) {

@@ -37,10 +37,12 @@ struct RigSummary {
   calib::PatternTest unsteady;  ///< images that keep no common rate (calib/validation)
 };
 
-/// Solves for the rig behind the photos. Throws UsageError when lenses are given for some cameras
-/// and not for others, Error as SolveRig and ChooseModel do.
+/// Solves for the rig behind the photos; `progress` is told of the solves and asked whether to
+/// stop. Throws UsageError when lenses are given for some cameras and not for others, Error as
+/// SolveRig and ChooseModel do.
 calib::Calibration CalibrateRig(const calib::Board& board, const RigPhotos& photos,
-                                const RigCalibrationOptions& options, RigSummary* summary);
+                                const RigCalibrationOptions& options, RigSummary* summary,
+                                Progress& progress);
 
 /// A known lens (lens_file.h) as boards are solved with. Throws Error, starting with `where`, for
 /// lens models that they are not solved with.

@@ -7,6 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "calib/validation/conclusion.h"
 #include "calib/validation/report_json.h"
 #include "dtr/base/memory_budget.h"
 #include "dtr/eval/cross_depth.h"
@@ -145,8 +146,9 @@ SetValidation ValidateSet(const std::filesystem::path& folder, const DtrSet& set
   calib::Bundle bundle = calib::BundleOf(of.cameras, of.poses, of.names, sparse);
   const bool panoramas = rig && calib::HasOneCentre(rig->known);
   const int by_rig = panoramas ? LeaveOutViewsOfTheRigAlone(bundle) : 0;
-  calib::PhotosValidation validation =
-      calib::ValidatePhotos(bundle, limits.photos, threads, &progress);
+  calib::BundleLimits photos = limits.photos;
+  photos.lenses_are_given = photos.lenses_are_given || rig.has_value();
+  calib::PhotosValidation validation = calib::ValidatePhotos(bundle, photos, threads, &progress);
   if (panoramas) {  // it is that of free views: those of a panorama are known far better
     std::erase_if(validation.tests,
                   [](const Check& test) { return test.name == "image_shift_px"; });
@@ -172,7 +174,9 @@ SetValidation ValidateSet(const std::filesystem::path& folder, const DtrSet& set
 
 std::string ToJson(const SetValidation& report) {
   using Json = nlohmann::ordered_json;
-  Json json = calib::JsonOf(report);
+  Json json{{"result", ResultWord(report.passed())},
+            {"conclusion", calib::Conclusion(report.tests, calib::Validated::kPhotos)}};
+  json.update(calib::JsonOf(report));
   json["adjustment"] = calib::JsonOf(report.adjustment);
   if (report.cross_depth) {
     json["cross_depth"] = eval::JsonOf(*report.cross_depth);

@@ -34,7 +34,8 @@ struct SetValidation : calib::ValidationReport {
   calib::PhotosValidation adjustment;                 ///< by a fresh bundle adjustment
 };
 
-/// JSON object: that of calib::ToJson(calib::ValidationReport), `adjustment`, and `cross_depth`
+/// JSON object: result and conclusion (calib/validation/conclusion.h), that of
+/// calib::ToJson(calib::ValidationReport), `adjustment`, and `cross_depth`
 /// {views[], all} where there is such.
 std::string ToJson(const SetValidation& report);
 

@@ -10,6 +10,7 @@
 #include "calib/boards/observations.h"
 #include "calib/models/board_model.h"
 #include "calib/solve/arrow_information.h"
+#include "dtr/base/progress.h"
 #include "dtr/types/pose.h"
 
 namespace dtr::calib {
@@ -27,6 +28,8 @@ struct SolveOptions {
   /// Reject a distortion that turns back inside the image (CoversImage). Off where a camera only
   /// has to explain boards and will not be kept.
   bool cover_image = true;
+  /// Told of every pass of a rig's solve, and asked before it whether to stop. Null: nobody.
+  Progress* progress = nullptr;
 };
 
 /// A view as the solution explains it.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <iterator>
 #include <limits>
@@ -102,8 +103,31 @@ std::vector<std::pair<size_t, ViewError>> FoldErrors(
   return errors;
 }
 
+// Counts the solves of a choice: of every model all views, and every fold.
+class SolveCount {
+ public:
+  SolveCount(const ChoiceOptions& options, size_t folds) : progress_(options.progress) {
+    const size_t solves = std::size(kBoardModels) * (1 + folds);
+    if (progress_ != nullptr) progress_->Stage(options.stage, static_cast<int>(solves));
+  }
+  // May be called from any thread.
+  void Done() {
+    if (progress_ == nullptr) return;
+    progress_->ThrowIfInterrupted();
+    progress_->Update(++done_);
+  }
+
+ private:
+  Progress* progress_;
+  std::atomic<int> done_ = 0;
+};
+
+size_t FoldsOf(std::span<const BoardView> views, const ChoiceOptions& options) {
+  return std::min(views.size(), static_cast<size_t>(std::max(2, options.folds)));
+}
+
 std::vector<ModelScore> SolveAll(const Board& board, std::span<const BoardView> views, int width_px,
-                                 int height_px, const ChoiceOptions& options) {
+                                 int height_px, const ChoiceOptions& options, SolveCount& count) {
   std::vector<ModelScore> scores(std::size(kBoardModels));
   ParallelFor(0, static_cast<int>(scores.size()), options.threads, [&](int m) {
     ModelScore& score = scores[static_cast<size_t>(m)];
@@ -114,6 +138,7 @@ std::vector<ModelScore> SolveAll(const Board& board, std::span<const BoardView> 
     } catch (const Error& error) {
       score.refused = error.what();
     }
+    count.Done();
   });
   return scores;
 }
@@ -121,15 +146,16 @@ std::vector<ModelScore> SolveAll(const Board& board, std::span<const BoardView> 
 using ErrorsByModel = std::vector<std::vector<ViewError>>;
 
 ErrorsByModel HoldOut(const Board& board, std::span<const BoardView> views,
-                      const ChoiceOptions& options, std::vector<ModelScore>& scores) {
+                      const ChoiceOptions& options, std::vector<ModelScore>& scores,
+                      SolveCount& count) {
   const auto disbelieved = DisbelievedByAll(scores, views);
-  const size_t folds = std::min(views.size(), static_cast<size_t>(std::max(2, options.folds)));
+  const size_t folds = FoldsOf(views, options);
   ErrorsByModel errors(scores.size(), std::vector<ViewError>(views.size()));
   std::vector<std::string> refused(scores.size() * folds);
   ParallelFor(0, static_cast<int>(refused.size()), options.threads, [&](int task) {
     const auto at = static_cast<size_t>(task);
     const size_t m = at / folds, fold = at % folds;
-    if (!scores[m].solution) return;
+    if (!scores[m].solution) return count.Done();
     try {
       for (const auto& [i, error] :
            FoldErrors(board, views, *scores[m].solution, fold, folds, options.solve, disbelieved)) {
@@ -138,6 +164,7 @@ ErrorsByModel HoldOut(const Board& board, std::span<const BoardView> views,
     } catch (const Error& error) {
       refused[at] = error.what();
     }
+    count.Done();
   });
   for (size_t at = 0; at < refused.size(); ++at) {
     ModelScore& score = scores[at / folds];
@@ -231,8 +258,9 @@ ModelChoice ChooseModel(const Board& board, std::span<const BoardView> views, in
                     kMinViewsToChoose, views.size()));
   }
   ModelChoice choice;
-  choice.scores = SolveAll(board, views, width_px, height_px, options);
-  const ErrorsByModel errors = HoldOut(board, views, options, choice.scores);
+  SolveCount count(options, FoldsOf(views, options));
+  choice.scores = SolveAll(board, views, width_px, height_px, options, count);
+  const ErrorsByModel errors = HoldOut(board, views, options, choice.scores, count);
   std::vector<size_t> all(views.size());
   for (size_t i = 0; i < all.size(); ++i) all[i] = i;
   for (size_t m = 0; m < choice.scores.size(); ++m) {

@@ -130,11 +130,20 @@ bool NameOutliers(const Board& board, double outlier_sigmas, SigmaRule sigma_of,
   return used != before;
 }
 
+constexpr int kPasses = kMaxRobustPasses + kMaxOutlierPasses;
+
+void BeginPass(const RigOptions& options, int pass) {
+  if (options.solve.progress == nullptr) return;
+  options.solve.progress->ThrowIfInterrupted();
+  options.solve.progress->Update(pass);
+}
+
 void SolveRobustly(const Board& board, const RigOptions& options, Rig& rig,
                    std::vector<LeftOut>& left_out) {
   double scale = kCauchySigmas * SigmaOfUsed(ResidualLengths(board, rig), UsedOf(rig));
   ChooseFramePoses(board, scale, rig);
   for (int pass = 0; pass < kMaxRobustPasses; ++pass) {
+    BeginPass(options, pass);
     Minimise(board, options.free_lenses, scale, Drawable(ResidualLengths(board, rig)), rig);
     ChooseFramePoses(board, scale, rig);
     const double next = kCauchySigmas * SigmaOfUsed(ResidualLengths(board, rig), UsedOf(rig));
@@ -145,6 +154,7 @@ void SolveRobustly(const Board& board, const RigOptions& options, Rig& rig,
   NameOutliers(board, options.solve.outlier_sigmas, SigmaOfUsed, rig);
   TakeOutDisagreeing(rig, left_out);
   for (int pass = 0; pass < kMaxOutlierPasses; ++pass) {
+    BeginPass(options, kMaxRobustPasses + pass);
     Minimise(board, options.free_lenses, {}, UsedOf(rig), rig);
     if (!NameOutliers(board, options.solve.outlier_sigmas, ScatterOfUsed, rig)) break;
     TakeOutDisagreeing(rig, left_out);
@@ -164,6 +174,7 @@ void SolveQuadratically(const Board& board, const RigOptions& options, Rig& rig)
   // Until the residuals, which say what the prior of the lenses weighs, do not shrink any more.
   double sigma = SigmaOfUsed(ResidualLengths(board, rig), UsedOf(rig));
   for (int pass = 0; pass < kMaxRobustPasses; ++pass) {
+    BeginPass(options, pass);
     Minimise(board, options.free_lenses, {}, UsedOf(rig), rig);
     const double next = SigmaOfUsed(ResidualLengths(board, rig), UsedOf(rig));
     const bool settled = std::abs(next - sigma) < kSameScale * sigma;
@@ -281,6 +292,9 @@ RigSolution SolveRig(const Board& board, std::span<const RigCameraInput> cameras
   solution.layout = RigLayout(solution.rig.cameras, options.free_lenses);
   if (solution.layout.size() == 0) {
     Reject("expected something to solve for, found one camera whose intrinsics are given");
+  }
+  if (options.solve.progress != nullptr) {
+    options.solve.progress->Stage("solving for all cameras together", kPasses);
   }
   if (options.solve.loss == Loss::kRobust) {
     SolveRobustly(board, options, solution.rig, solution.left_out);

@@ -29,8 +29,13 @@ class BoardValidator {
  public:
   BoardValidator(const ValidatedCalibration& calibration,
                  const std::optional<TestViews>& test_views, const BoardLimits& limits, int threads,
-                 std::span<const double> distances)
-      : calibration_(calibration), test_views_(test_views), limits_(limits), threads_(threads) {
+                 std::span<const double> distances, Progress* progress)
+      : calibration_(calibration),
+        test_views_(test_views),
+        limits_(limits),
+        threads_(threads),
+        progress_(progress) {
+    if (progress_ != nullptr) progress_->Stage("validating the calibration", kSteps);
     report_.test_views = test_views.has_value();
     for (const RigCamera& camera : calibration.cameras) {
       report_.cameras.push_back({});
@@ -54,17 +59,31 @@ class BoardValidator {
       report_.sigma_px = kept_.solution->sigma_px;
       report_.condition = kept_.solution->information.condition();
     }
+    StepDone();
     FitStored();
+    StepDone();
     TestResiduals();
+    StepDone();
     TestStoredAgainstFresh();
     TestData();
+    StepDone();
     TestUncertainty();
+    StepDone();
     TestHalves();
     TestPatterns();
+    StepDone();
     return std::move(report_);
   }
 
  private:
+  static constexpr int kSteps = 6;
+
+  void StepDone() {
+    if (progress_ == nullptr) return;
+    progress_->ThrowIfInterrupted();
+    progress_->Update(++steps_done_);
+  }
+
   void Add(Check check) { report_.tests.push_back(std::move(check)); }
 
   // The views that the stored calibration is held against.
@@ -468,6 +487,8 @@ class BoardValidator {
   const std::optional<TestViews>& test_views_;
   const BoardLimits& limits_;
   int threads_;
+  Progress* progress_;
+  int steps_done_ = 0;
   BoardValidation report_;
   Fresh kept_, fresh_;
   Rig fitted_;
@@ -479,7 +500,7 @@ class BoardValidator {
 BoardValidation ValidateBoards(const ValidatedCalibration& calibration,
                                const std::optional<TestViews>& test_views,
                                const BoardLimits& limits, int threads,
-                               std::span<const double> distances) {
+                               std::span<const double> distances, Progress* progress) {
   const auto& views = test_views ? test_views->views : calibration.kept;
   for (size_t c = 0; c < calibration.cameras.size(); ++c) {
     if (std::none_of(views.begin(), views.end(), [&](const auto& v) { return v.camera == c; })) {
@@ -488,7 +509,7 @@ BoardValidation ValidateBoards(const ValidatedCalibration& calibration,
                               test_views ? "among the images" : "in the file; give `images`"));
     }
   }
-  return BoardValidator(calibration, test_views, limits, threads, distances).Run();
+  return BoardValidator(calibration, test_views, limits, threads, distances, progress).Run();
 }
 
 }  // namespace dtr::calib

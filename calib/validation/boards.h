@@ -10,6 +10,7 @@
 #include "calib/validation/patterns.h"
 #include "calib/validation/projection.h"
 #include "calib/validation/reprojection.h"
+#include "dtr/base/progress.h"
 #include "dtr/types/check.h"
 
 namespace dtr::calib {
@@ -97,16 +98,18 @@ struct BoardValidation {
 
 /// Everything docs/VALIDATION.md lists, in its order. A test that cannot be made fails and says
 /// why; a degeneracy is named. `distances` (board units, > 0): where else uncertainty is reported,
-/// which breaks no test. Requires kept or unseen views of every camera; throws Error without.
+/// which breaks no test. `progress` is told of the steps and asked whether to stop. Requires kept
+/// or unseen views of every camera; throws Error without.
 BoardValidation ValidateBoards(const ValidatedCalibration& calibration,
                                const std::optional<TestViews>& test_views,
                                const BoardLimits& limits, int threads = 0,
-                               std::span<const double> distances = {});
+                               std::span<const double> distances = {},
+                               Progress* progress = nullptr);
 
-/// JSON object: passed, tests[] as `validate` of sets has them; cameras[] with stored and held_out
-/// residuals, noise_px, regions[9], coverage, uncertainty_px and far_uncertainty_px {largest, p95,
-/// median}, uncertainty_at[] (the same with distance), views[]; sigma_px, condition, test_photos,
-/// flipped[].
+/// JSON object: passed, result and conclusion (conclusion.h), tests[] as `validate` of sets has
+/// them; cameras[] with stored and held_out residuals, noise_px, regions[9], coverage,
+/// uncertainty_px and far_uncertainty_px {largest, p95, median}, uncertainty_at[] (the same with
+/// distance), views[]; sigma_px, condition, test_photos, flipped[].
 std::string ToJson(const BoardValidation& report);
 
 // Of the views alone (data_tests.cpp), one check each, worst camera named.

@@ -1,3 +1,4 @@
+#include "calib/validation/conclusion.h"
 #include "calib/validation/report_json.h"
 #include "dtr/types/check_json.h"
 
@@ -17,6 +18,8 @@ Json JsonOf(const ImageMap& map) {
 Json JsonOf(const BoardValidation& report) {
   Json json;
   json["passed"] = report.passed();
+  json["result"] = ResultWord(report.passed());
+  json["conclusion"] = Conclusion(report.tests, Validated::kBoards);
   json["tests"] = dtr::JsonOf(report.tests);
   json["cameras"] = Json::array();
   RotationCounts rotated;

@@ -9,6 +9,7 @@
 #include "calib/models/board_model.h"
 #include "capture/contents_json.h"
 #include "cli/command.h"
+#include "cli/commands/validate_calibration.h"
 #include "cli/output_file.h"
 #include "dtr/base/error.h"
 #include "dtr/base/order_statistics.h"
@@ -106,22 +107,24 @@ int RunCalibrateBoard(const CalibrateBoardArguments& options, const Context& con
   detect.detector = DetectorFrom(options.detector);
   const auto photos = pipeline::ReadBoardPhotos(options.photos, options.images, board, detect,
                                                 context.common.threads, context.console);
-  const auto calibration =
-      pipeline::CalibrateBoard(board, photos, options.outputs.front().stem().string(), calibrate);
+  const auto calibration = pipeline::CalibrateBoard(
+      board, photos, options.outputs.front().stem().string(), calibrate, context.console);
   for (const fs::path& output : options.outputs) pipeline::WriteCameraFile(output, calibration);
   SayModels(calibration, context.console);
   SayCamera(calibration, context.console);
   nlohmann::ordered_json json = calib::SummaryJson(calibration);
   json["contents"] = capture::JsonOf(photos.contents);
+  const int code = ValidateMade(calibration, context, json);
   context.EmitJson(json);
-  return kDone;
+  return code;
 }
 
 }  // namespace
 
 void AddCalibrateBoardCommand(CLI::App& calibrate) {
   AddCommand(
-      calibrate, "board", "Calibrate one camera from photos of a board",
+      calibrate, "board",
+      "Calibrate one camera from photos of a board, and validate it; exit 1 when a test fails",
       "dtr calibrate board photos/ --board chessboard:9x6:25mm -o left.json -o left.yml",
       [](CLI::App& command) -> Action {
         auto options = std::make_shared<CalibrateBoardArguments>();

@@ -9,6 +9,7 @@
 #include "calib/validation/boards.h"
 #include "capture/contents_json.h"
 #include "cli/command.h"
+#include "cli/commands/validate_calibration.h"
 #include "cli/output_file.h"
 #include "dtr/base/error.h"
 #include "pipeline/calibrate_rig.h"
@@ -134,21 +135,26 @@ int RunCalibrateRig(const CalibrateRigArguments& options, const Context& context
   const auto photos = pipeline::ReadRigPhotos(options.folder, board, {}, context.common.threads,
                                               context.console, known);
   pipeline::RigSummary summary;
-  const auto calibration = pipeline::CalibrateRig(board, photos, calibrate, &summary);
+  const auto calibration =
+      pipeline::CalibrateRig(board, photos, calibrate, &summary, context.console);
   for (const fs::path& output : options.outputs) pipeline::WriteRigFile(output, calibration);
   SayRig(calibration, summary, context.console);
   SayDelays(calibration, summary, context.console);
   nlohmann::ordered_json json = calib::SummaryJson(calibration);
   json["contents"] = capture::JsonOf(photos.contents);
+  const int code = ValidateMade(calibration, context, json);
   context.EmitJson(json);
-  return kDone;
+  return code;
 }
 
 }  // namespace
 
 void AddCalibrateRigCommand(CLI::App& calibrate) {
   AddCommand(
-      calibrate, "rig", "Calibrate cameras that are fixed to each other from a board that they see",
+      calibrate, "rig",
+      "Calibrate cameras that are fixed to each other from a board that they see, and validate "
+      "them; "
+      "exit 1 when a test fails",
       "dtr calibrate rig pairs/ --board chessboard:9x6:25mm -o rig.json -o rig.yml",
       [](CLI::App& command) -> Action {
         auto options = std::make_shared<CalibrateRigArguments>();

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "calib/validation/boards.h"
+#include "calib/validation/conclusion.h"
 #include "cli/command.h"
 #include "cli/commands/validate_calibration.h"
 #include "cli/number_checks.h"
@@ -32,10 +33,7 @@ void SayReport(const pipeline::SetValidation& report, Console& console) {
                             held_out.count, held_out.rms_px, held_out.median_px, held_out.p95_px,
                             held_out.worst_px));
   }
-  for (const Check& test : report.tests) {
-    console.Say(fmt::format("{} {}: {:.4g} (limit {:.4g}): {}", test.passed ? "passed" : "FAILED",
-                            test.name, test.value, test.limit, test.reason));
-  }
+  for (const Check& test : report.tests) console.Say(calib::LineOf(test));
   if (!report.adjustment.not_validated.empty()) {
     console.Say("not validated by a fresh bundle adjustment: " + report.adjustment.not_validated);
   }
@@ -85,6 +83,7 @@ int RunValidate(ValidateArguments options, const Context& context) {
     context.console.Say("report: " + page->string());
   }
   context.EmitJson(pipeline::ToJson(report));
+  context.console.Say(calib::Conclusion(report.tests, calib::Validated::kPhotos));
   return report.passed() ? kDone : kFailed;
 }
 

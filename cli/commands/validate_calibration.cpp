@@ -6,6 +6,7 @@
 
 #include "calib/boards/board.h"
 #include "calib/boards/length.h"
+#include "calib/validation/conclusion.h"
 #include "calib/validation/report_json.h"
 #include "cli/output_file.h"
 #include "dtr/base/error.h"
@@ -31,10 +32,7 @@ void SayReport(const calib::BoardValidation& report, Console& console) {
              console);
     SayStats(camera.name, "held out", camera.held_out, camera.noise_px, console);
   }
-  for (const Check& test : report.tests) {
-    console.Say(fmt::format("{} {}: {:.4g} (limit {:.4g}): {}", test.passed ? "passed" : "FAILED",
-                            test.name, test.value, test.limit, test.reason));
-  }
+  for (const Check& test : report.tests) console.Say(calib::LineOf(test));
   if (!report.flipped.empty()) {
     console.Say(fmt::format("counted from the other end, and repaired: {}",
                             fmt::join(report.flipped, ", ")));
@@ -121,8 +119,9 @@ int RunValidateCalibration(const ValidateCalibrationOptions& options, const Cont
     }
     test_views = std::move(photos.test_views);
   }
-  const calib::BoardValidation report = calib::ValidateBoards(
-      pipeline::ToValidate(calibration), test_views, limits, context.common.threads, distances);
+  const calib::BoardValidation report =
+      calib::ValidateBoards(pipeline::ToValidate(calibration), test_views, limits,
+                            context.common.threads, distances, &context.console);
   SayReport(report, context.console);
   SayUncertainty(report, calibration.board.metric, context.console);
   if (options.report) {
@@ -135,6 +134,22 @@ int RunValidateCalibration(const ValidateCalibrationOptions& options, const Cont
   nlohmann::ordered_json json = calib::JsonOf(report);
   json["skipped"] = skipped;
   context.EmitJson(json, -1);
+  context.console.Say(calib::Conclusion(report.tests, calib::Validated::kBoards));
+  return report.passed() ? kDone : kFailed;
+}
+
+int ValidateMade(const calib::Calibration& calibration, const Context& context,
+                 nlohmann::ordered_json& json) {
+  const calib::BoardValidation report = calib::ValidateBoards(
+      pipeline::ToValidate(calibration), {}, {}, context.common.threads, {}, &context.console);
+  for (const Check& test : report.tests) {
+    if (!test.passed) context.console.Say(calib::LineOf(test));
+  }
+  nlohmann::ordered_json all = calib::JsonOf(report);
+  for (const char* kept : {"passed", "result", "conclusion", "tests"}) {
+    json["validation"][kept] = std::move(all[kept]);
+  }
+  context.console.Say(calib::Conclusion(report.tests, calib::Validated::kBoards));
   return report.passed() ? kDone : kFailed;
 }
 

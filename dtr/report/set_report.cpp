@@ -69,17 +69,21 @@ void AddChecks(HtmlReport& page, const std::vector<Check>& checks) {
   std::vector<std::vector<Cell>> rows;
   const auto number = [](double v) { return std::isfinite(v) ? fmt::format("{:.4g}", v) : "-"; };
   for (const Check& check : checks) {
-    rows.push_back({check.name, number(check.value), number(check.limit),
-                    std::string(check.passed ? "holds" : "BROKEN"), check.reason});
+    rows.push_back({check.name, number(check.value),
+                    fmt::format("{} {}", LimitWords(check), number(check.limit)),
+                    std::string(ResultWord(check.passed)), check.reason});
   }
-  page.Table({"Check", "Value", "Limit", "Outcome", "Reason"}, rows);
+  page.Table({"Test", "Value", "Limit", "Result", "Reason"}, rows);
 }
 
 void AddSetSections(HtmlReport& page, const DtrSet& set, const SetReportInfo& info) {
   if (!info.checks.empty()) {
     const bool good = AllPassed(info.checks);
-    page.Result(good, good ? "The calibration passed its checks"
-                           : "The calibration broke at least one check");
+    const auto failed = std::count_if(info.checks.begin(), info.checks.end(),
+                                      [](const Check& check) { return !check.passed; });
+    page.Result(good, good ? fmt::format("validation {}", ResultWord(true))
+                           : fmt::format("validation {}: {} of {} tests are beyond their limits",
+                                         ResultWord(false), failed, info.checks.size()));
   }
   std::vector<std::vector<Cell>> facts;
   for (const auto& [name, value] : info.facts) facts.push_back({name, value});

@@ -35,7 +35,8 @@ class GivenLenses : public ::testing::Test {
     RigCalibrationOptions options;
     for (const std::string& name : names) options.given[name] = GivenLens(lens, "lens.txt");
     RigSummary summary;
-    CalibrateRig(CalibrationOf({}).board, photos, options, &summary);
+    SilentProgress nobody;
+    CalibrateRig(CalibrationOf({}).board, photos, options, &summary, nobody);
   }
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "calib/validation/conclusion.h"
 #include "dtr/base/error.h"
 #include "dtr/io/image_io.h"
 #include "dtr/report/html.h"
@@ -83,8 +84,7 @@ std::string CalibrationPage(const calib::Calibration& calibration,
                             const calib::BoardValidation& judged, const std::string& title,
                             const std::optional<fs::path>& images) {
   report::HtmlReport page(title);
-  page.Result(judged.passed(), judged.passed() ? "The calibration passed its tests"
-                                               : "The calibration broke at least one test");
+  page.Result(judged.passed(), calib::Conclusion(judged.tests, calib::Validated::kBoards));
   page.Section("Can the calibration be trusted?");
   report::AddChecks(page, judged.tests);
   AddCameraTable(page, judged);

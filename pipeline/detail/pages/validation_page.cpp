@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 
+#include "calib/validation/conclusion.h"
 #include "dtr/base/error.h"
 #include "dtr/base/order_statistics.h"
 #include "dtr/io/set_io.h"
@@ -191,8 +192,7 @@ std::string ValidationPage(const fs::path& folder, const DtrSet& set, const SetV
                            const std::string& title) {
   const std::vector<View>& views = set.frames.front().views;
   report::HtmlReport page(title);
-  page.Result(report.passed(), report.passed() ? "The calibration passed its tests"
-                                               : "The calibration broke at least one test");
+  page.Result(report.passed(), calib::Conclusion(report.tests, calib::Validated::kPhotos));
   page.Section("Can the calibration be trusted?");
   report::AddChecks(page, report.tests);
   if (!report.adjustment.not_validated.empty()) {
