@@ -42,9 +42,12 @@ Posed Refined(const Unbending& matches, const RelativePose& start, double scale,
 RelativePose FromFundamental(const VotePair& pair, const LensPair& lenses,
                              const Unbending& matches);
 
-/// Costs and poses of a pair over a list of lenses; each is tried from the fundamental matrix and
-/// from the pose at the lenses before.
+/// Costs and poses of a pair over a list of lenses; each is tried from the fundamental matrix, from
+/// the pose at the lenses before and from those of a plane.
 std::vector<Posed> OverLenses(const VotePair& pair, const std::vector<LensPair>& lenses);
+
+/// The pose of a pair that a fresh search finds, or a plane's.
+Posed Reposed(const VotePair& pair, const LensPair& lenses);
 
 /// A lens of another focal length and k1.
 VoteLens Stepped(const VoteLens& lens, double log_focal, double k1);

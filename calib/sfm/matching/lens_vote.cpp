@@ -2,6 +2,8 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -16,7 +18,8 @@ namespace {
 constexpr double kK1s[] = {-0.3, -0.18, -0.08, 0, 0.1};
 constexpr double kFisheyeK1s[] = {-0.12, -0.06, 0, 0.06};  // of the angle
 constexpr double kFarthestOffAxis = 1.4;  // rad; farther off, the plane z = 1 magnifies 30 times
-constexpr int kSteps = 25;
+constexpr double kCentreDeviation = 0.01;  // long sides, of the prior
+constexpr int kSteps = 25, kReposings = 3;
 
 std::vector<VoteLens> Grid(const VoteOptions& options) {
   std::vector<VoteLens> lenses;
@@ -32,31 +35,45 @@ std::vector<VoteLens> Grid(const VoteOptions& options) {
   return lenses;
 }
 
+// Unknowns of a lens: the logarithm of the focal length, k1 and the principal point. Nobody asks
+// for the last, but where it stays in the middle, what it is off goes into the focal length.
+constexpr int kOfLens = 4;
+enum LensUnknown { kLogFocal, kRadial, kCentreX, kCentreY };
+using LensMatrix = Eigen::Matrix<double, kOfLens, kOfLens>;
+using LensVector = Eigen::Matrix<double, kOfLens, 1>;
+
 // Normal equations of a pair: pose and lens.
 struct Normal {
-  Eigen::Matrix<double, 7, 7> h = Eigen::Matrix<double, 7, 7>::Zero();
-  Eigen::Matrix<double, 7, 1> g = Eigen::Matrix<double, 7, 1>::Zero();
+  Eigen::Matrix<double, 5 + kOfLens, 5 + kOfLens> h =
+      Eigen::Matrix<double, 5 + kOfLens, 5 + kOfLens>::Zero();
+  Eigen::Matrix<double, 5 + kOfLens, 1> g = Eigen::Matrix<double, 5 + kOfLens, 1>::Zero();
   double weights = 0, squares = 0;
 };
 
 // Of the lens alone, the pose eliminated.
 struct Reduced {
-  Eigen::Matrix2d h = Eigen::Matrix2d::Zero();
-  Eigen::Vector2d g = Eigen::Vector2d::Zero();
+  LensMatrix h = LensMatrix::Zero();
+  LensVector g = LensVector::Zero();
 };
 
 Reduced ReducedOf(const Normal& n) {
   const auto pose = n.h.topLeftCorner<5, 5>().ldlt();
-  const Eigen::Matrix<double, 5, 2> across = n.h.topRightCorner<5, 2>();
-  return {n.h.bottomRightCorner<2, 2>() - across.transpose() * pose.solve(across),
-          n.g.tail<2>() - across.transpose() * pose.solve(n.g.head<5>())};
+  const Eigen::Matrix<double, 5, kOfLens> across = n.h.topRightCorner<5, kOfLens>();
+  return {n.h.bottomRightCorner<kOfLens, kOfLens>() - across.transpose() * pose.solve(across),
+          n.g.tail<kOfLens>() - across.transpose() * pose.solve(n.g.head<5>())};
+}
+
+VoteLens Stepped(const VoteLens& lens, const LensVector& step) {
+  return {lens.focal * std::exp(step[kLogFocal]), lens.k1 + step[kRadial], lens.fisheye,
+          lens.centre + step.tail<2>()};
 }
 
 Normal NormalOf(const VotePair& pair, const VoteLens& lens, const RelativePose& pose) {
   constexpr double kStep = 1e-5;
   Normal normal;
   const PoseDerivatives at(pose);
-  const VoteLens nearby[2] = {Stepped(lens, kStep, 0), Stepped(lens, 0, kStep)};
+  std::array<VoteLens, kOfLens> nearby;
+  for (int k = 0; k < kOfLens; ++k) nearby[k] = Stepped(lens, kStep * LensVector::Unit(k));
   const auto residual = [&](const VoteLens& by, size_t i, PoseRow* row, double& scale) {
     double ma = 1, mb = 1;
     const auto a = Unbent(by, pair.points.a[i], &ma), b = Unbent(by, pair.points.b[i], &mb);
@@ -71,9 +88,9 @@ Normal NormalOf(const VotePair& pair, const VoteLens& lens, const RelativePose& 
     if (!std::isfinite(r)) continue;
     const double root = 1 / (1 + r * r), weight = root * root;
     if (weight < 1e-3) continue;
-    Eigen::Matrix<double, 7, 1> row;
+    Eigen::Matrix<double, 5 + kOfLens, 1> row;
     row.head<5>() = pose_row.transpose() / scale;
-    for (int k = 0; k < 2; ++k) {
+    for (int k = 0; k < kOfLens; ++k) {
       const double moved = residual(nearby[k], i, nullptr, other);
       row[5 + k] = std::isfinite(moved) ? (moved - r) / kStep : 0;
     }
@@ -113,6 +130,23 @@ class Joint {
     return result;
   }
 
+  // Looks for a better pose of each pair at the lens as it is now; whether that changed anything.
+  bool Repose() {
+    constexpr double kBetter = 0.999;  // of a pair's cost
+    std::vector<char> better(pairs_.size());
+    ParallelFor(0, static_cast<int>(pairs_.size()), options_.threads, [&](int i) {
+      const auto p = static_cast<size_t>(i);
+      if (options_.progress != nullptr) options_.progress->ThrowIfInterrupted();
+      const Posed posed = Reposed(pairs_[p], {lens_, lens_});
+      const double now = CostOf(Unbend({lens_, lens_}, pairs_[p].points, kScale), poses_[p]);
+      if (!(posed.cost < kBetter * now)) return;
+      poses_[p] = posed.pose;
+      better[p] = 1;
+    });
+    cost_ = Cost(lens_, poses_);
+    return std::count(better.begin(), better.end(), 1) > 0;
+  }
+
  private:
   double DataCost(const VoteLens& lens, const std::vector<RelativePose>& poses) const {
     double cost = 0;
@@ -122,20 +156,24 @@ class Joint {
     return cost;
   }
 
-  double Cost(const VoteLens& lens, const std::vector<RelativePose>& poses) const {
-    const double f = std::log(lens.focal / options_.prior_focal) / kLogFocalDeviation;
-    const double k = lens.k1 / kK1Deviation;
-    return DataCost(lens, poses) + kPriorNoise * kPriorNoise * (f * f + k * k);
+  // What the priors weigh, and where a lens stands from what they say.
+  static LensVector PriorWeights() {
+    const LensVector deviations(kLogFocalDeviation, kK1Deviation, kCentreDeviation,
+                                kCentreDeviation);
+    return kPriorNoise * kPriorNoise * deviations.cwiseAbs2().cwiseInverse();
+  }
+  LensVector OffPriors(const VoteLens& lens) const {
+    return {std::log(lens.focal / options_.prior_focal), lens.k1, lens.centre.x(), lens.centre.y()};
   }
 
-  // The reduced system of the lens (2 x 2) with its priors, and what each pair gives.
-  void Reduce(double damping, Eigen::Matrix2d& h, Eigen::Vector2d& g,
-              std::vector<Normal>& normals) const {
-    const double noise = kPriorNoise * kPriorNoise;
-    const double f = noise / (kLogFocalDeviation * kLogFocalDeviation);
-    const double k = noise / (kK1Deviation * kK1Deviation);
-    h = Eigen::Vector2d(f, k).asDiagonal();
-    g << f * std::log(lens_.focal / options_.prior_focal), k * lens_.k1;
+  double Cost(const VoteLens& lens, const std::vector<RelativePose>& poses) const {
+    return DataCost(lens, poses) + PriorWeights().dot(OffPriors(lens).cwiseAbs2());
+  }
+
+  // The reduced system of the lens with its priors, and what each pair gives.
+  void Reduce(double damping, LensMatrix& h, LensVector& g, std::vector<Normal>& normals) const {
+    h = PriorWeights().asDiagonal();
+    g = PriorWeights().cwiseProduct(OffPriors(lens_));
     const auto add = [&](const Reduced& of_pair) {
       h += of_pair.h;
       g += of_pair.g;
@@ -150,32 +188,36 @@ class Joint {
       n.h.diagonal().head<5>().array() += 1e-9;
       add(ReducedOf(n));
     }
-    if (options_.focal_is_fixed) Fix(0, h, g);
-    if (options_.k1_is_fixed) Fix(1, h, g);
+    FixUnasked(h, g);
     h.diagonal() *= 1 + damping;
   }
 
-  static void Fix(int i, Eigen::Matrix2d& h, Eigen::Vector2d& g) {
-    h.row(i).setZero();
-    h.col(i).setZero();
-    h(i, i) = 1;
-    g[i] = 0;
+  // Unknowns that hold take no part.
+  void FixUnasked(LensMatrix& h, LensVector& g) const {
+    for (const auto& [unknown, fixed] : {std::pair(kLogFocal, options_.focal_is_fixed),
+                                         std::pair(kRadial, options_.k1_is_fixed)}) {
+      if (!fixed) continue;
+      h.row(unknown).setZero();
+      h.col(unknown).setZero();
+      h(unknown, unknown) = 1;
+      g[unknown] = 0;
+    }
   }
 
   bool Step(double damping) {
-    Eigen::Matrix2d h;
-    Eigen::Vector2d g;
+    LensMatrix h;
+    LensVector g;
     std::vector<Normal> normals;
     Reduce(damping, h, g, normals);
-    Eigen::Vector2d step = -h.ldlt().solve(g);
+    LensVector step = -h.ldlt().solve(g);
     if (!step.allFinite()) return false;
-    const double shorten = std::max({1.0, std::abs(step[0]) / 0.3, std::abs(step[1]) / 0.1});
-    step /= shorten;
-    const VoteLens lens = Stepped(lens_, step[0], step[1]);
+    step /= std::max({1.0, std::abs(step[kLogFocal]) / 0.3, std::abs(step[kRadial]) / 0.1});
+    const VoteLens lens = Stepped(lens_, step);
     std::vector<RelativePose> poses;
     for (size_t p = 0; p < pairs_.size(); ++p) {
       const Normal& n = normals[p];
-      const Eigen::Matrix<double, 5, 1> right = n.g.head<5>() + n.h.topRightCorner<5, 2>() * step;
+      const Eigen::Matrix<double, 5, 1> right =
+          n.g.head<5>() + n.h.topRightCorner<5, kOfLens>() * step;
       Eigen::Matrix<double, 5, 1> move = -n.h.topLeftCorner<5, 5>().ldlt().solve(right);
       if (!move.allFinite()) move.setZero();
       poses.push_back(PoseDerivatives(poses_[p]).Moved(move));
@@ -189,8 +231,8 @@ class Joint {
   }
 
   double Deviation() const {
-    Eigen::Matrix2d h;
-    Eigen::Vector2d g;
+    LensMatrix h;
+    LensVector g;
     std::vector<Normal> normals;
     Reduce(0, h, g, normals);
     double weights = 0, squares = 0;
@@ -206,7 +248,7 @@ class Joint {
   // What matches tell of the lens is wrong in the same way all over a pair, and in pairs that share
   // a photo: one Newton step from the solution tells what it becomes without a photo's pairs. The
   // jackknife over the nodes of a graph (Snijders and Borgatti, Connections 1999).
-  double VarianceByPhotos(const Eigen::Matrix2d& h, const std::vector<Normal>& normals) const {
+  double VarianceByPhotos(const LensMatrix& h, const std::vector<Normal>& normals) const {
     std::map<int, Reduced> of_photo;
     for (size_t p = 0; p < pairs_.size(); ++p) {
       const Reduced reduced = ReducedOf(normals[p]);
@@ -219,13 +261,9 @@ class Joint {
     if (count < 3) return 0;  // without one of two photos nothing is left
     double sum = 0;
     for (auto& [photo, reduced] : of_photo) {
-      if (options_.focal_is_fixed) Fix(0, reduced.h, reduced.g);
-      if (options_.k1_is_fixed) Fix(1, reduced.h, reduced.g);
-      Eigen::Matrix2d left = h - reduced.h;
-      for (int i = 0; i < 2; ++i) {
-        if (i == 0 ? options_.focal_is_fixed : options_.k1_is_fixed) left(i, i) = 1;
-      }
-      const double change = left.ldlt().solve(reduced.g)[0];
+      LensMatrix left = h - reduced.h;
+      FixUnasked(left, reduced.g);
+      const double change = left.ldlt().solve(reduced.g)[kLogFocal];
       if (std::isfinite(change)) sum += change * change;
     }
     return (count - 2) / (2 * count) * sum;
@@ -242,7 +280,7 @@ class Joint {
 
 std::optional<Eigen::Vector2d> Unbent(const VoteLens& lens, const Eigen::Vector2d& p,
                                       double* magnification) {
-  const Eigen::Vector2d bent = p / lens.focal;
+  const Eigen::Vector2d bent = (p - lens.centre) / lens.focal;
   const double target = bent.norm();
   if (lens.k1 < 0 && target > 0.98 * 2.0 / 3 / std::sqrt(-3 * lens.k1)) return std::nullopt;
   double r = target;
@@ -287,7 +325,10 @@ std::optional<VoteResult> VoteOnLens(const std::vector<VotePair>& pairs,
   }
   std::vector<RelativePose> poses;
   for (const auto& of_pair : posed) poses.push_back(of_pair[best].pose);
-  return Joint(pairs, options, lenses[best], std::move(poses)).Solve();
+  Joint joint(pairs, options, lenses[best], std::move(poses));
+  VoteResult result = joint.Solve();
+  for (int k = 0; k < kReposings && joint.Repose(); ++k) result = joint.Solve();
+  return result;
 }
 
 }  // namespace dtr::sfm::matching

@@ -22,6 +22,8 @@ struct VotePair {
 struct VoteLens {
   double focal = 1, k1 = 0;
   bool fisheye = false;
+  Eigen::Vector2d centre =
+      Eigen::Vector2d::Zero();  ///< the principal point, from where it is taken
 };
 
 struct VoteOptions {

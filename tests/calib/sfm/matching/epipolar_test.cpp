@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <array>
 
+#include "calib/sfm/matching/planar_poses.h"
 #include "calib/sfm/matching/robust_fit.h"
 #include "dtr/base/random.h"
 
@@ -52,6 +53,36 @@ TEST(SfmEpipolar, SevenMatchesGiveTheTruthAmongTheirSolutions) {
     }
     EXPECT_LT(nearest, 1e-6) << seed;
   }
+}
+
+TEST(SfmEpipolar, APlaneLeavesTheTruthAndOneOtherPose) {
+  const Eigen::Vector3d normal = Eigen::Vector3d(0.2, -0.3, 1) / 5;
+  const Eigen::Matrix3d h = kTruth.r + kTruth.t * normal.transpose();
+  PointPairs points;
+  Random random(4);
+  for (int i = 0; i < 20; ++i) {
+    const double x = random.Uniform(-0.5, 0.5);
+    const Eigen::Vector2d a(x, random.Uniform(-0.5, 0.5));
+    points.Add(a, (h * a.homogeneous()).hnormalized());
+  }
+  for (const double scale : {2.0, -0.5}) {
+    const auto both = PosesOfPlane(scale * h, points);
+    ASSERT_TRUE(both);
+    const auto off = [](const RelativePose& pose) {
+      return (pose.r - kTruth.r).norm() + (pose.t - kTruth.t).norm();
+    };
+    EXPECT_LT(std::min(off((*both)[0]), off((*both)[1])), 1e-9);
+    EXPECT_GT(std::max(off((*both)[0]), off((*both)[1])), 0.1);
+    for (const RelativePose& pose : *both) {
+      EXPECT_NEAR(pose.r.determinant(), 1, 1e-9);
+      for (size_t i = 0; i < points.size(); ++i) {
+        EXPECT_LT(SampsonSquared(pose.Essential(), points.a[i], points.b[i]), 1e-18);
+        const auto depths = DepthsOf(pose, points.a[i], points.b[i]);
+        EXPECT_TRUE(depths && depths->minCoeff() > 0);
+      }
+    }
+  }
+  EXPECT_FALSE(PosesOfPlane(kTruth.r, points));
 }
 
 TEST(SfmEpipolar, ManyMatchesGiveTheFundamentalMatrix) {

@@ -17,7 +17,8 @@ constexpr double kNoise = 0.3 / 1600;  // of features
 
 // All pairs of seven photos about a box; of `zoomed`, the photos from the last but two on, the
 // focal length is another one. Of a fisheye points lie nearer, so that they are farther off axis.
-std::vector<VotePair> Pairs(double zoomed, bool fisheye = false) {
+std::vector<VotePair> Pairs(double zoomed, bool fisheye = false,
+                            const Eigen::Vector2d& centre = Eigen::Vector2d::Zero()) {
   constexpr int kPhotos = 7;
   Random random(3);
   std::vector<Eigen::Vector3d> points;
@@ -46,7 +47,8 @@ std::vector<VotePair> Pairs(double zoomed, bool fisheye = false) {
         Eigen::Vector2d at = (rotations[photo] * p + translations[photo]).hnormalized();
         if (fisheye) at *= std::atan(at.norm()) / at.norm();
         const double dx = random.Normal();
-        return Eigen::Vector2d(focal(photo) * at + kNoise * Eigen::Vector2d(dx, random.Normal()));
+        return Eigen::Vector2d(focal(photo) * at + centre +
+                               kNoise * Eigen::Vector2d(dx, random.Normal()));
       };
       for (const auto& p : points) {
         const Eigen::Vector2d in_a = seen(a, p);
@@ -101,6 +103,15 @@ TEST(LensVote, AFisheyesPixelIsItsAngleAndItsMagnificationThatOfThePlane) {
   const double tangential = std::tan(1.1) / at(1.1).norm();
   EXPECT_NEAR(magnification, std::sqrt(radial * tangential), 1e-4);
   EXPECT_FALSE(Unbent({0.4, 0, true}, 0.4 * 1.5 * direction, nullptr));
+}
+
+TEST(LensVote, APrincipalPointOffTheMiddleDoesNotBecomeFocalLength) {
+  for (const double side : {-1.0, 1.0}) {
+    const auto vote = VoteOnLens(Pairs(kFocal, false, side * Eigen::Vector2d(0.012, -0.01)), {});
+    ASSERT_TRUE(vote);
+    EXPECT_LT(std::abs(std::log(vote->lens.focal / kFocal)), 3 * vote->log_focal_deviation);
+    EXPECT_LT(vote->log_focal_deviation, 0.01);
+  }
 }
 
 // Matches of one zoomed photo agree with each other as well as any: only that photos differ tells.
