@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "calib/models/fisheye.h"
+#include "calib/sfm/mapping/repetition.h"
 #include "dtr/base/order_statistics.h"
 
 namespace dtr::sfm {
@@ -78,20 +79,41 @@ std::string WhyNotFocal(const MapEvidence& evidence) {
   return "";
 }
 
+// Reprojection errors, in px of an image of 1000 px.
+struct RelativeErrors {
+  std::vector<double> all;
+  std::vector<std::vector<double>> of_image;
+};
+
+RelativeErrors RelativeErrorsOf(const ViewGraph& graph, const MapCameras& cameras,
+                                std::span<const MapPoint> points) {
+  RelativeErrors errors;
+  errors.of_image.resize(graph.images.size());
+  for (const MapPoint& point : points) {
+    for (const TrackFeature& f : point.seen) {
+      const double e = ReprojectionErrorPx(graph, cameras, f, point.p_in_world) /
+                       LimitPx(1, cameras.lenses[graph.images[f.image].camera]);
+      errors.all.push_back(e);
+      errors.of_image[f.image].push_back(e);
+    }
+  }
+  return errors;
+}
+
+// How many times the median error of all an image's is; 0 where it fits.
+double MisfitOf(const std::vector<double>& of_image, double median_of_all) {
+  const double median = UpperMedian(of_image);
+  return median > std::max(kMaxMedianPx, 3 * median_of_all) ? median / median_of_all : 0;
+}
+
 std::string WhyNotErrors(const MapEvidence& evidence, MapStatistics* statistics) {
-  std::vector<double> errors, relative;
-  std::vector<std::vector<double>> of_image(evidence.graph.images.size());
-  double sum = 0, relative_sum = 0;
+  std::vector<double> errors;
+  double sum = 0;
   for (const MapPoint& point : evidence.points) {
     for (const TrackFeature& f : point.seen) {
       const double e = ReprojectionErrorPx(evidence.graph, evidence.cameras, f, point.p_in_world);
-      const int camera = evidence.graph.images[f.image].camera;
-      const double r = e / LimitPx(1, evidence.cameras.lenses[camera]);
       errors.push_back(e);
-      relative.push_back(r);
-      of_image[f.image].push_back(r);
       sum += e * e;
-      relative_sum += r * r;
     }
   }
   if (errors.empty()) return "no point is left";
@@ -99,22 +121,25 @@ std::string WhyNotErrors(const MapEvidence& evidence, MapStatistics* statistics)
   statistics->observations = static_cast<int>(errors.size());
   statistics->error_median_px = UpperMedian(errors);
   statistics->error_rms_px = std::sqrt(sum / count);
-  const double median = UpperMedian(relative), rms = std::sqrt(relative_sum / count);
-  if (!(median <= kMaxMedianPx && rms <= kMaxRmsPx)) {
+  const RelativeErrors relative =
+      RelativeErrorsOf(evidence.graph, evidence.cameras, evidence.points);
+  const double median = UpperMedian(relative.all);
+  const double squares =
+      std::inner_product(relative.all.begin(), relative.all.end(), relative.all.begin(), 0.0);
+  if (!(median <= kMaxMedianPx && std::sqrt(squares / count) <= kMaxRmsPx)) {
     return fmt::format("reprojection errors are large: median {:.2f} px, RMS {:.2f} px",
                        statistics->error_median_px, statistics->error_rms_px);
   }
-  for (size_t i = 0; i < of_image.size(); ++i) {
+  for (size_t i = 0; i < relative.of_image.size(); ++i) {
     if (!evidence.cameras.placed[i]) continue;
-    if (of_image[i].size() < kMinPointsPerImage) {
+    if (relative.of_image[i].size() < kMinPointsPerImage) {
       return fmt::format("{} sees {} points of the map only", evidence.graph.images[i].name,
-                         of_image[i].size());
+                         relative.of_image[i].size());
     }
-    const double of_one = UpperMedian(of_image[i]);
-    if (of_one > std::max(kMaxMedianPx, 3 * median)) {
+    if (const double misfit = MisfitOf(relative.of_image[i], median); misfit > 0) {
       return fmt::format(
           "{} does not fit: its median reprojection error is {:.1f} times that of all",
-          evidence.graph.images[i].name, of_one / median);
+          evidence.graph.images[i].name, misfit);
     }
   }
   return "";
@@ -201,6 +226,19 @@ class Growth {
 
 }  // namespace
 
+std::vector<int> MisfitsOf(const ViewGraph& graph, const MapCameras& cameras,
+                           std::span<const MapPoint> points) {
+  const RelativeErrors errors = RelativeErrorsOf(graph, cameras, points);
+  std::vector<int> misfits;
+  if (errors.all.empty()) return misfits;
+  const double median = UpperMedian(errors.all);
+  for (size_t i = 0; i < errors.of_image.size(); ++i) {
+    if (errors.of_image[i].empty() || !(MisfitOf(errors.of_image[i], median) > 0)) continue;
+    misfits.push_back(static_cast<int>(i));
+  }
+  return misfits;
+}
+
 std::vector<int> LooselyJoined(const MapCameras& cameras, std::span<const MapPoint> points,
                                int min_points, int* most_points) {
   Growth growth(cameras, points);
@@ -257,6 +295,7 @@ std::string WhyNotContradicted(const MapEvidence& evidence, MapStatistics* stati
   std::vector<double> matches(evidence.graph.images.size()), against(matches.size());
   double all = 0, contradicted = 0;
   int pairs = 0;
+  const Repetition repetition(evidence.graph, evidence.points);
   for (const PairGeometry& pair : evidence.graph.pairs) {
     const auto count = static_cast<double>(pair.matches.size());
     if (count < kStrongMatches || !evidence.cameras.placed[pair.image_a] ||
@@ -264,7 +303,8 @@ std::string WhyNotContradicted(const MapEvidence& evidence, MapStatistics* stati
       continue;
     }
     const bool is_contradicted =
-        AgreeingShare(evidence.graph, evidence.cameras, pair, kAgreePx) < kContradictedBelow;
+        AgreeingShare(evidence.graph, evidence.cameras, pair, kAgreePx) < kContradictedBelow &&
+        !repetition.Explains(pair);
     all += count;
     contradicted += is_contradicted ? count : 0;
     pairs += is_contradicted ? 1 : 0;

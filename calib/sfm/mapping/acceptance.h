@@ -17,6 +17,11 @@ struct MapEvidence {
   std::span<const LeftOut> left_out;
 };
 
+/// Images that points of the map contradict: their median reprojection error is large, and three
+/// times that of all.
+std::vector<int> MisfitsOf(const ViewGraph& graph, const MapCameras& cameras,
+                           std::span<const MapPoint> points);
+
 /// Images that stay without a place when the map is built up again image by image: from the two
 /// that share the most points, always the image that sees the most points whose depth the images
 /// before it determine (two of them, rays 1 degree apart). Below `min_points` an image's distance

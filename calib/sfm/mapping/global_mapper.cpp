@@ -151,12 +151,14 @@ class Mapper {
     if (!Adjust(1, true, 20)) return false;
     Step();
     FilterPoints(graph_, cameras_, {4}, &points_);
+    if (UnplaceMisfits()) ResectLost();
     points_ = PointsOf(graph_, cameras_, tracks_, useful, {4}, options_.threads);
     UnplacePoor();
     FilterPoints(graph_, cameras_, {4}, &points_);
     // Slow directions, such as focal length against depth, need many iterations.
     if (!Adjust(FinalCauchy(), true, 100, 1e-9)) return false;
     FilterPoints(graph_, cameras_, {4}, &points_);
+    UnplaceMisfits();
     NameLost();
     Normalise();
     Step();
@@ -231,6 +233,14 @@ class Mapper {
     for (size_t i = 0; i < counts.size(); ++i) {
       if (counts[i] < kMinPointsOfImage) cameras_.placed[i] = 0;
     }
+  }
+
+  // One image that stands wrong must not cost the others their map; whether there was any.
+  bool UnplaceMisfits() {
+    const std::vector<int> misfits = MisfitsOf(graph_, cameras_, points_);
+    for (const int image : misfits) cameras_.placed[image] = 0;
+    if (!misfits.empty()) FilterPoints(graph_, cameras_, {4}, &points_);
+    return !misfits.empty();
   }
 
   void ResectLost() {

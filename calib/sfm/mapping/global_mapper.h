@@ -37,7 +37,8 @@ struct MapStatistics {
   double positioning_cost = 0;
   int tracks = 0, points = 0, observations = 0, registered = 0, resected = 0;
   double error_median_px = 0, error_rms_px = 0;
-  double contradicted_share = 0;  ///< of all matches: in pairs that the result contradicts
+  /// Of all matches: in pairs that the result contradicts and does not explain (repetition.h).
+  double contradicted_share = 0;
 };
 
 struct Mapped {

@@ -5,8 +5,12 @@
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 
+#include "calib/sfm/mapping/rotation_averaging.h"
 #include "calib/sfm/mapping/so3.h"
+#include "calib/sfm/matching/planar_poses.h"
+#include "calib/sfm/matching/robust_fit.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/base/random.h"
 
 namespace dtr::sfm {
 namespace {
@@ -19,6 +23,7 @@ using Eigen::Vector3d;
 constexpr size_t kMaxMatches = 400;
 constexpr size_t kMinMatches = 8;
 constexpr int kFitIterations = 10;
+constexpr double kLeastDepth = 0.05;  // of a unit ray; the plane z = 1 is for those before it
 
 struct RayPair {
   Vector3d a, b;
@@ -133,7 +138,7 @@ bool InFront(const RelativePose& pose, const RayPair& ray, double sigma) {
 std::optional<RelativePose> FivePoint(const std::vector<RayPair>& rays, double sigma) {
   std::vector<cv::Point2d> a, b;  // on the plane z = 1
   for (const RayPair& ray : rays) {
-    if (!(ray.a.z() > 0.05 && ray.b.z() > 0.05)) continue;
+    if (!(ray.a.z() > kLeastDepth && ray.b.z() > kLeastDepth)) continue;
     a.emplace_back(ray.a.x() / ray.a.z(), ray.a.y() / ray.a.z());
     b.emplace_back(ray.b.x() / ray.b.z(), ray.b.y() / ray.b.z());
   }
@@ -169,6 +174,57 @@ std::optional<RelativePose> FivePoint(const std::vector<RayPair>& rays, double s
   return best;
 }
 
+// The pose that fits the matches best, from a start.
+std::optional<MatchedPose> FittedTo(const std::vector<RayPair>& matched, RelativePose pose,
+                                    double sigma) {
+  const Fit fit = Refine(&pose, matched, 2 * sigma);
+  const double per_match = fit.cost / static_cast<double>(matched.size());
+  const double variance = std::max(per_match, sigma * sigma);
+  // Nothing is less certain than half a radian; so the matrix has an inverse, too.
+  Eigen::Matrix<double, 5, 5> information = fit.h / variance;
+  information.diagonal().array() += 4;
+  const MatchedPose fitted{pose.rotation, pose.translation,
+                           information.inverse().topLeftCorner<3, 3>()};
+  if (!fitted.covariance.allFinite() || !fitted.b_from_a.allFinite()) return std::nullopt;
+  return fitted;
+}
+
+double AngleBetween(const Matrix3d& a, const Matrix3d& b) {
+  return LogOf(a * b.transpose()).norm();
+}
+
+// The other pose of the plane that explains half of the matches and more.
+std::optional<MatchedPose> TwinOf(const MatchedPose& pose, const std::vector<RayPair>& matched,
+                                  double sigma, int index) {
+  constexpr double kLeastShare = 0.5;
+  constexpr double kBandSigmas = 3;
+  matching::PointPairs points;
+  for (const RayPair& ray : matched) {
+    if (ray.a.z() > kLeastDepth && ray.b.z() > kLeastDepth) {
+      points.Add(ray.a.hnormalized(), ray.b.hnormalized());
+    }
+  }
+  const auto plane = matching::FitHomography(points, kBandSigmas * sigma,
+                                             HashOf(static_cast<std::uint64_t>(index)));
+  const auto least = kLeastShare * static_cast<double>(matched.size());
+  if (!plane || static_cast<double>(plane->inliers.size()) < least) return std::nullopt;
+  matching::PointPairs on_plane;
+  for (const int i : plane->inliers) {
+    on_plane.Add(points.a[static_cast<size_t>(i)], points.b[static_cast<size_t>(i)]);
+  }
+  const auto both = matching::PosesOfPlane(plane->m, on_plane);
+  if (!both) return std::nullopt;
+  const bool first_is_other =
+      AngleBetween((*both)[0].r, pose.b_from_a) > AngleBetween((*both)[1].r, pose.b_from_a);
+  const matching::RelativePose& other = (*both)[first_is_other ? 0 : 1];
+  auto twin = FittedTo(matched, {other.r, other.t}, sigma);
+  // Poses that the certainty of pairs does not tell apart are one.
+  if (!twin || AngleBetween(twin->b_from_a, pose.b_from_a) < 2 * kRotationFloorRad) {
+    return std::nullopt;
+  }
+  return twin;
+}
+
 std::optional<RelativeRotation> RotationOf(const PairGeometry& pair, int index, const Rays& rays,
                                            double sigma) {
   const std::vector<RayPair> matched = RayPairsOf(pair, rays);
@@ -185,20 +241,11 @@ std::optional<RelativeRotation> RotationOf(const PairGeometry& pair, int index, 
   } else {
     pose.translation.normalize();
   }
-  const Fit fit = Refine(&pose, matched, 2 * sigma);
-  const double per_match = fit.cost / static_cast<double>(matched.size());
-  const double variance = std::max(per_match, sigma * sigma);
-  // Nothing is less certain than half a radian; so the matrix has an inverse, too.
-  Eigen::Matrix<double, 5, 5> information = fit.h / variance;
-  information.diagonal().array() += 4;
-  RelativeRotation rotation{index,
-                            pair.image_a,
-                            pair.image_b,
-                            pose.rotation,
-                            pose.translation,
-                            information.inverse().topLeftCorner<3, 3>(),
-                            static_cast<int>(pair.matches.size())};
-  if (!rotation.covariance.allFinite() || !rotation.b_from_a.allFinite()) return std::nullopt;
+  const auto fitted = FittedTo(matched, pose, sigma);
+  if (!fitted) return std::nullopt;
+  RelativeRotation rotation{
+      {*fitted}, index, pair.image_a, pair.image_b, static_cast<int>(pair.matches.size())};
+  if (!pose.turns_only()) rotation.twin = TwinOf(rotation, matched, sigma, index);
   return rotation;
 }
 

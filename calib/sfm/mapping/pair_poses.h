@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "calib/sfm/view_graph.h"
@@ -19,23 +20,35 @@ using Rays = std::vector<std::vector<Eigen::Vector3d>>;
 /// names get none, since they are not needed.
 Rays RaysOf(const ViewGraph& graph, std::span<const calib::LensCamera> cameras, int threads);
 
-/// Rotation of a pair of images, as its matches tell.
-struct RelativeRotation {
-  int pair = 0;  ///< index into ViewGraph::pairs
-  int image_a = 0, image_b = 0;
+/// A relative pose, as matches tell.
+struct MatchedPose {
   Eigen::Matrix3d b_from_a = Eigen::Matrix3d::Identity();
   Eigen::Vector3d b_translation_a = Eigen::Vector3d::Zero();  ///< length 1, or 0: unknown
   /// Of a small rotation w in frame b, observed = exp(w) true; rad^2. Of pairs with little parallax
   /// rotation and translation explain nearly the same: they are uncertain in that direction alone.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
+};
+
+/// Rotation of a pair of images, as its matches tell.
+struct RelativeRotation : MatchedPose {
+  int pair = 0;  ///< index into ViewGraph::pairs
+  int image_a = 0, image_b = 0;
   int matches = 0;
+  /// Most matches of a pair often lie on one plane (a wall, a floor), which two poses explain
+  /// alike; the few others, with what is found along wrong epipolar lines, may choose the wrong
+  /// one. The other one, where there is one; only other pairs can tell.
+  std::optional<MatchedPose> twin = {};
+
+  /// Takes the twin in the place of the pose.
+  void TakeTwin() { std::swap(static_cast<MatchedPose&>(*this), *twin); }
 };
 
 /// The rotation of every pair, in their order; empty where the matches give none. The graph's own
 /// rotation is where a robust fit of the epipolar angles (Sampson's, on the unit sphere; Cauchy's
 /// loss) starts. Pairs without one (kUncalibrated) start at the five-point algorithm (Nister
-/// 2004; OpenCV's, with RANSAC). `sigma_rad` is what a feature's position is known to, per image.
-/// Throws Interrupted where `progress` (null: nothing) asks to stop.
+/// 2004; OpenCV's, with RANSAC). Twins are from the homography that explains half of the matches,
+/// if one does. `sigma_rad` is what a feature's position is known to, per image. Throws Interrupted
+/// where `progress` (null: nothing) asks to stop.
 std::vector<std::optional<RelativeRotation>> RelativeRotationsOf(
     const ViewGraph& graph, const Rays& rays, std::span<const double> sigma_rad, int threads,
     const Progress* progress = nullptr);

@@ -25,9 +25,13 @@ RelativeRotation OfNodes(const ViewGraph& graph, const std::vector<int>& nodes,
                          RelativeRotation rotation) {
   const Matrix3d& a = graph.images[rotation.image_a].cam_from_station;
   const Matrix3d& b = graph.images[rotation.image_b].cam_from_station;
-  rotation.b_from_a = b.transpose() * rotation.b_from_a * a;
-  rotation.b_translation_a = b.transpose() * rotation.b_translation_a;
-  rotation.covariance = b.transpose() * rotation.covariance * b;
+  const auto turn = [&](MatchedPose& pose) {
+    pose.b_from_a = b.transpose() * pose.b_from_a * a;
+    pose.b_translation_a = b.transpose() * pose.b_translation_a;
+    pose.covariance = b.transpose() * pose.covariance * b;
+  };
+  turn(rotation);
+  if (rotation.twin) turn(*rotation.twin);
   rotation.image_a = nodes[rotation.image_a];
   rotation.image_b = nodes[rotation.image_b];
   return rotation;
@@ -67,6 +71,19 @@ void KeepIf(std::vector<RelativeRotation>* pairs, std::vector<double>* support, 
   }
   pairs->resize(kept);
   support->resize(kept);
+}
+
+// Takes the twins that agree better with the averaged rotations.
+void TakeAgreeingTwins(std::vector<RelativeRotation>* pairs, AveragedRotations* averaged) {
+  for (size_t p = 0; p < pairs->size(); ++p) {
+    RelativeRotation& pair = (*pairs)[p];
+    if (!pair.twin) continue;
+    const double misfit = MisfitOf(*pair.twin, averaged->cam_from_world[pair.image_a],
+                                   averaged->cam_from_world[pair.image_b]);
+    if (misfit >= averaged->misfit[p]) continue;
+    pair.TakeTwin();
+    averaged->misfit[p] = misfit;
+  }
 }
 
 void Summarise(const AveragedRotations& averaged, MapStatistics* statistics) {
@@ -143,11 +160,13 @@ Rotations SelectPairs(const ViewGraph& graph, const Rays& rays, const MapOptions
     result.why_not = "no pair of photos shows parallax: the camera was rotated at one position";
   }
   if (result.why_not.empty()) {
+    ChooseTwins(images, &pairs);
     std::vector<double> support = TripletSupport(images, pairs);
     KeepIf(&pairs, &support, [&](size_t p) { return support[p] >= kMinSupport; });
     AveragedRotations averaged;
     for (int pass = 0; pass <= kFilterPasses; ++pass) {
       if (pass > 0) {
+        TakeAgreeingTwins(&pairs, &averaged);
         KeepIf(&pairs, &support, [&](size_t p) { return averaged.misfit[p] <= kMaxMisfit; });
       }
       result.connected = LargestPart(images, &pairs);

@@ -44,11 +44,12 @@ Matrix3d WithFloor(const Matrix3d& covariance) {
 struct Directed {
   Matrix3d rotation, covariance;
 };
+Directed Forwards(const MatchedPose& pose) { return {pose.b_from_a, WithFloor(pose.covariance)}; }
 Directed From(const RelativeRotation& pair, int from) {
-  const Matrix3d covariance = WithFloor(pair.covariance);
-  if (pair.image_a == from) return {pair.b_from_a, covariance};
+  const Directed ab = Forwards(pair);
+  if (pair.image_a == from) return ab;
   // The inverse of exp(w) R is exp(-R^T w) R^T.
-  return {pair.b_from_a.transpose(), pair.b_from_a.transpose() * covariance * pair.b_from_a};
+  return {ab.rotation.transpose(), ab.rotation.transpose() * ab.covariance * ab.rotation};
 }
 
 bool Closes(const Directed& ab, const Directed& bc, const Directed& ca) {
@@ -59,6 +60,50 @@ bool Closes(const Directed& ab, const Directed& bc, const Directed& ca) {
                               ca_bc * ab.covariance * ca_bc.transpose();
   return error.dot(covariance.ldlt().solve(error)) < kClosesAtSigmas * kClosesAtSigmas;
 }
+
+// The cycles of three pairs that each pair is part of.
+class Triplets {
+ public:
+  Triplets(int images, std::span<const RelativeRotation> pairs)
+      : pairs_(pairs), edges_(EdgesOf(images, pairs)) {}
+
+  // The two other pairs of each: those with the most matches first, kMaxTriplets of them.
+  std::vector<std::pair<int, int>> Of(size_t p) const {
+    const auto &of_a = edges_[pairs_[p].image_a], &of_b = edges_[pairs_[p].image_b];
+    std::vector<std::pair<int, std::pair<int, int>>> common;
+    for (size_t i = 0, k = 0; i < of_a.size() && k < of_b.size();) {
+      if (of_a[i].to == of_b[k].to) {
+        const int weakest = std::min(pairs_[of_a[i].pair].matches, pairs_[of_b[k].pair].matches);
+        common.push_back({-weakest, {of_a[i].pair, of_b[k].pair}});
+        ++i, ++k;
+      } else {
+        of_a[i].to < of_b[k].to ? ++i : ++k;
+      }
+    }
+    std::sort(common.begin(), common.end());
+    if (common.size() > kMaxTriplets) common.resize(kMaxTriplets);
+    std::vector<std::pair<int, int>> legs;
+    for (const auto& [matches, of_triplet] : common) legs.push_back(of_triplet);
+    return legs;
+  }
+
+  // How many of them close with a pose of the pair.
+  int ClosedBy(const MatchedPose& pose, size_t p,
+               const std::vector<std::pair<int, int>>& legs) const {
+    const int a = pairs_[p].image_a, b = pairs_[p].image_b;
+    int closed = 0;
+    for (const auto& [leg_a, leg_b] : legs) {
+      const RelativeRotation& ac = pairs_[leg_a];
+      const int c = ac.image_a == a ? ac.image_b : ac.image_a;
+      closed += Closes(Forwards(pose), From(pairs_[leg_b], b), From(ac, c)) ? 1 : 0;
+    }
+    return closed;
+  }
+
+ private:
+  std::span<const RelativeRotation> pairs_;
+  std::vector<std::vector<Edge>> edges_;
+};
 
 Vector3d ResidualOf(const RelativeRotation& pair, const std::vector<Matrix3d>& world) {
   return LogOf(pair.b_from_a * world[pair.image_a] * world[pair.image_b].transpose());
@@ -189,34 +234,38 @@ class Stepper {
 }  // namespace
 
 std::vector<double> TripletSupport(int images, std::span<const RelativeRotation> pairs) {
-  const auto edges = EdgesOf(images, pairs);
+  const Triplets triplets(images, pairs);
   std::vector<double> support(pairs.size(), 0.5);
   for (size_t p = 0; p < pairs.size(); ++p) {
-    const int a = pairs[p].image_a, b = pairs[p].image_b;
-    const auto &of_a = edges[a], &of_b = edges[b];
-    // Common neighbours, those with the most matches first.
-    std::vector<std::pair<int, std::pair<int, int>>> common;
-    for (size_t i = 0, k = 0; i < of_a.size() && k < of_b.size();) {
-      if (of_a[i].to == of_b[k].to) {
-        const int weakest = std::min(pairs[of_a[i].pair].matches, pairs[of_b[k].pair].matches);
-        common.push_back({-weakest, {of_a[i].pair, of_b[k].pair}});
-        ++i, ++k;
-      } else {
-        of_a[i].to < of_b[k].to ? ++i : ++k;
-      }
-    }
-    if (common.empty()) continue;
-    std::sort(common.begin(), common.end());
-    if (common.size() > kMaxTriplets) common.resize(kMaxTriplets);
-    int closed = 0;
-    for (const auto& [matches, legs] : common) {
-      const RelativeRotation& ac = pairs[legs.first];
-      const int c = ac.image_a == a ? ac.image_b : ac.image_a;
-      closed += Closes(From(pairs[p], a), From(pairs[legs.second], b), From(ac, c)) ? 1 : 0;
-    }
-    support[p] = static_cast<double>(closed) / static_cast<double>(common.size());
+    const auto legs = triplets.Of(p);
+    if (legs.empty()) continue;
+    support[p] = static_cast<double>(triplets.ClosedBy(pairs[p], p, legs)) /
+                 static_cast<double>(legs.size());
   }
   return support;
+}
+
+void ChooseTwins(int images, std::vector<RelativeRotation>* pairs) {
+  constexpr int kPasses = 10;
+  const Triplets triplets(images, *pairs);  // sees what the pairs become
+  bool changed = true;
+  for (int pass = 0; pass < kPasses && changed; ++pass) {
+    changed = false;
+    for (size_t p = 0; p < pairs->size(); ++p) {
+      RelativeRotation& pair = (*pairs)[p];
+      if (!pair.twin) continue;
+      const auto legs = triplets.Of(p);
+      if (triplets.ClosedBy(*pair.twin, p, legs) <= triplets.ClosedBy(pair, p, legs)) continue;
+      pair.TakeTwin();
+      changed = true;
+    }
+  }
+}
+
+double MisfitOf(const MatchedPose& pose, const Matrix3d& a_from_world,
+                const Matrix3d& b_from_world) {
+  const Vector3d r = LogOf(pose.b_from_a * a_from_world * b_from_world.transpose());
+  return std::sqrt(std::max(0.0, r.dot(WithFloor(pose.covariance).ldlt().solve(r))));
 }
 
 AveragedRotations AverageRotations(int images, std::span<const RelativeRotation> pairs,

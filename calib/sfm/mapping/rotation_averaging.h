@@ -18,6 +18,14 @@ inline constexpr double kRotationFloorRad = 0.02;
 /// looked at. Pairs without triplets have 0.5.
 std::vector<double> TripletSupport(int images, std::span<const RelativeRotation> pairs);
 
+/// Takes the twins with which more triplets close than with the pose (of as many the pose), until
+/// no pair changes. Right poses close their triplets, wrong ones those of the same mistake alone.
+void ChooseTwins(int images, std::vector<RelativeRotation>* pairs);
+
+/// What a pose of images a and b disagrees by with rotations in one world, in standard deviations.
+double MisfitOf(const MatchedPose& pose, const Eigen::Matrix3d& a_from_world,
+                const Eigen::Matrix3d& b_from_world);
+
 /// Rotations in one world, and what pairs disagree by.
 struct AveragedRotations {
   std::vector<Eigen::Matrix3d> cam_from_world;  ///< per image; identity where no pair has it

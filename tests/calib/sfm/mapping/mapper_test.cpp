@@ -5,6 +5,7 @@
 
 #include "calib/sfm/mapping/global_mapper.h"
 #include "calib/sfm/mapping/model_check.h"
+#include "calib/sfm/matching/planar_poses.h"
 #include "tests/calib/sfm/mapping/synthetic_graph.h"
 
 namespace dtr::sfm {
@@ -241,6 +242,99 @@ TEST(GlobalMapper, EqualFacadesAreNotFoldedIntoOne) {
     const Mapped mapped = MapGlobally(seen.graph, {});
     ExpectSolvedOrRefused(mapped, scene);
   }
+}
+
+// Photos of a wall with a few things before it: verification may take a pair for the other of the
+// two poses that the wall leaves.
+TEST(GlobalMapper, PairsWithTheOtherPoseOfTheirPlaneAreFound) {
+  Scene scene{{testing::Lens()}, {}, {}, Box(500, {-4, -3, 8}, {4, 3, 8})};
+  for (const auto& p : Box(40, {-2, -2, 6}, {2, 2, 7}, 9)) scene.points.push_back(p);
+  for (int i = 0; i < 14; ++i) {
+    const double x = 2.0 * (i % 5) - 4, y = 1.8 * (i / 5) - 2;
+    scene.cam_from_world.push_back(LookAt({x, y, 0.5 * (i % 3)}, {0, 0.1 * y, 8}));
+  }
+  Seen seen = GraphOf(scene);
+  int turned = 0;
+  for (size_t k = 0; k < seen.graph.pairs.size(); ++k) {
+    PairGeometry& pair = seen.graph.pairs[k];
+    if (k % 5 > 1) continue;
+    matching::PointPairs on_wall;
+    for (const auto& [a, b] : pair.matches) {
+      if (seen.shows[pair.image_a][a] >= 500 || seen.shows[pair.image_b][b] >= 500) continue;
+      on_wall.Add(
+          scene.lenses[0].RayFromPixel(seen.graph.images[pair.image_a].pixels[a])->hnormalized(),
+          scene.lenses[0].RayFromPixel(seen.graph.images[pair.image_b].pixels[b])->hnormalized());
+    }
+    const Pose& a_from_world = scene.cam_from_world[pair.image_a];
+    const Pose b_from_a = scene.cam_from_world[pair.image_b] * a_from_world.Inverse();
+    const Vector3d normal = a_from_world.rotation * Vector3d::UnitZ();
+    const double distance = 8 - a_from_world.TargetOriginInSource().z();
+    const auto both = matching::PosesOfPlane(
+        b_from_a.rotation.toRotationMatrix() + b_from_a.translation * normal.transpose() / distance,
+        on_wall);
+    ASSERT_TRUE(both);
+    const auto off = [&](const matching::RelativePose& pose) {
+      return (pose.r - b_from_a.rotation.toRotationMatrix()).norm();
+    };
+    const auto& other = (*both)[off((*both)[0]) > off((*both)[1]) ? 0 : 1];
+    ASSERT_LT(std::min(off((*both)[0]), off((*both)[1])), 1e-6);
+    pair.b_rotation_a = other.r;
+    pair.b_translation_a = other.t;
+    turned += off(other) > 0.1 ? 1 : 0;
+  }
+  ASSERT_GT(4 * turned, static_cast<int>(seen.graph.pairs.size()));
+  ExpectSolved(MapGlobally(seen.graph, {}), scene);
+}
+
+// A wallpaper whose pattern repeats: photos of one place match photos of another.
+struct Wallpaper {
+  Seen seen;
+  Scene scene;
+};
+Wallpaper PhotographWallpaper(int photos_of_both) {
+  constexpr double kRepeat = 6;
+  Wallpaper wallpaper{{}, {{testing::Lens()}, {}, {}, Box(500, {-2.5, -2, 5}, {2.5, 2, 7})}};
+  Scene& scene = wallpaper.scene;
+  const size_t pattern = scene.points.size();
+  for (size_t p = 0; p < pattern; ++p) {
+    scene.points.push_back({scene.points[p].p + Vector3d(kRepeat, 0, 0), Vector3d::Zero()});
+  }
+  for (int i = 0; i < 20; ++i) {
+    const double x = kRepeat * i / 19.0;
+    scene.cam_from_world.push_back(LookAt({x, 0.5 * (i % 2), 0}, {x, 0, 6}));
+  }
+  for (int i = 0; i < photos_of_both; ++i) {
+    scene.cam_from_world.push_back(LookAt({1 + 2.0 * i, 1 - i, -5}, {3, 0, 6}));
+  }
+  const GraphSpec spec;
+  wallpaper.seen = GraphOf(scene, spec);
+  Random random(12);
+  for (int a = 0; a < 5; ++a) {
+    for (int b = 15; b < 20; ++b) {
+      std::vector<int> of_b;
+      for (const int p : wallpaper.seen.shows[b]) {
+        of_b.push_back(p >= static_cast<int>(pattern) ? p - static_cast<int>(pattern) : -1);
+      }
+      Pose shifted = scene.cam_from_world[b];
+      shifted.translation += shifted.rotation * Vector3d(kRepeat, 0, 0);
+      PairGeometry pair = testing::MatchPair(
+          wallpaper.seen, a, b, of_b, shifted * scene.cam_from_world[a].Inverse(), spec, &random);
+      wallpaper.seen.graph.pairs.push_back(pair);
+    }
+  }
+  testing::SortPairs(&wallpaper.seen.graph);
+  return wallpaper;
+}
+
+// That there are two of what looks alike shows where photos see both.
+TEST(GlobalMapper, PairsOfARepeatedPatternDoNotContradictAMapWhosePhotosSeeBothPlaces) {
+  const Wallpaper wallpaper = PhotographWallpaper(4);
+  ExpectSolved(MapGlobally(wallpaper.seen.graph, {}), wallpaper.scene);
+}
+
+TEST(GlobalMapper, WithoutSuchPhotosTheyDo) {
+  const Wallpaper wallpaper = PhotographWallpaper(0);
+  EXPECT_THAT(MapGlobally(wallpaper.seen.graph, {}).why_not, ::testing::HasSubstr("contradict"));
 }
 
 // Two groups with points of their own; one pair of photos across has points that no other sees.

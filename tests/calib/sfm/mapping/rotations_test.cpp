@@ -30,7 +30,7 @@ Truth Chain(int images, double wrong_share) {
   for (int i = 0; i < images; ++i) truth.world.push_back(ExpOf(RandomVector(&random)));
   for (int a = 0; a < images; ++a) {
     for (int b = a + 1; b < std::min(images, a + 9); ++b) {
-      RelativeRotation pair{static_cast<int>(truth.pairs.size()), a, b};
+      RelativeRotation pair{{}, static_cast<int>(truth.pairs.size()), a, b};
       const bool wrong = random.Uniform() < wrong_share;
       const Vector3d error = RandomVector(&random) * (wrong ? 1 : 0.0035);
       pair.b_from_a = ExpOf(error) * truth.world[b] * truth.world[a].transpose();
