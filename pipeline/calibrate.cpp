@@ -44,6 +44,7 @@ SfmSummary SummaryOf(const colmap::SfmReport& report, const calib::SfmModel& mod
           .images_per_model = report.images_per_model,
           .lack_of_parallax = report.lack_of_parallax,
           .forward_motion = report.forward_motion,
+          .doubt = report.doubt,
           .feature_image_size_px = report.max_image_size_px,
           .lens_model =
               model.cameras.empty() ? "" : calib::NameOf(model.cameras.begin()->second.model)};

@@ -21,6 +21,7 @@ struct SfmSummary {
   std::vector<int> images_per_model;  ///< largest first; the first was taken
   std::string lack_of_parallax;       ///< a sentence; empty: enough pairs have parallax
   bool forward_motion = false;        ///< mapped with the thresholds of a walk straight ahead
+  std::string doubt;                  ///< why the cameras are not sure; empty: they passed
   int feature_image_size_px = 0;      ///< long side to which photos were shrunk for features
   std::string lens_model;             ///< of the first camera; empty: there is none
 };

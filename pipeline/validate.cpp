@@ -14,6 +14,7 @@
 #include "dtr/eval/report_json.h"
 #include "dtr/io/set_io.h"
 #include "pipeline/detail/cameras/given_cameras.h"
+#include "pipeline/detail/cameras/sfm_doubt.h"
 #include "pipeline/set_rig.h"
 
 namespace dtr::pipeline {
@@ -162,6 +163,7 @@ SetValidation ValidateSet(const std::filesystem::path& folder, const DtrSet& set
   }
   if (places) report.tests.push_back(*places);
   if (const auto given = GivenCamerasCheck(set)) report.tests.push_back(*given);
+  if (const auto doubt = SfmDoubtCheck(set)) report.tests.push_back(*doubt);
   for (const calib::PhotoValidation& validated_photo : validation.cameras) {
     const auto camera =
         std::find_if(report.cameras.begin(), report.cameras.end(),

@@ -64,10 +64,18 @@ Undetermined UndeterminedOf(Workspace& workspace, const calib::SfmModel& model,
   return {calib::WhyUndetermined(model, refine), by_path};
 }
 
-// Drops COLMAP's models unless the matches agree with the largest. Returns why not.
-std::string DropContradicted(Workspace& workspace, const std::vector<CameraGroup>& groups,
-                             std::vector<calib::SfmModel>& colmaps) {
-  if (colmaps.empty()) return "";
+// A model that tests do not pass, though the photos determine it.
+struct Doubtful {
+  calib::SfmModel model;
+  std::string why;
+  bool by_colmap = false;
+};
+
+// Drops COLMAP's models unless the matches agree with the largest, which is returned then.
+std::optional<Doubtful> DropContradicted(Workspace& workspace,
+                                         const std::vector<CameraGroup>& groups,
+                                         std::vector<calib::SfmModel>& colmaps) {
+  if (colmaps.empty()) return std::nullopt;
   sfm::ViewGraph graph = ReadViewGraph(workspace.database());
   // What EXIF says contradicts nothing; what pairs voted for does.
   const GroupLenses exif = LensesOf(workspace, groups);
@@ -78,8 +86,10 @@ std::string DropContradicted(Workspace& workspace, const std::vector<CameraGroup
   }
   for (sfm::GraphImage& image : graph.images) image.name = workspace.NameOfAlias(image.name);
   std::string why = sfm::WhyContradicted(graph, colmaps.front(), workspace.threads());
-  if (!why.empty()) colmaps.clear();
-  return why;
+  if (why.empty()) return std::nullopt;
+  Doubtful dropped{std::move(colmaps.front()), std::move(why), true};
+  colmaps.clear();
+  return dropped;
 }
 
 // A model of the global mapper, and what the photos leave undetermined of it where it passes.
@@ -121,13 +131,14 @@ std::string WhyAsked(const Workspace& workspace, const Own& own) {
 }
 
 void WriteNote(const Workspace& workspace, const GloballyMapped& ours, bool colmaps,
-               const std::string& asked_because) {
+               const std::string& asked_because, const std::string& doubt = "") {
   json why = json::object();
   if (!colmaps) {
     for (const auto& [name, reason] : ours.why_without_camera) why[name] = reason;
   }
   const json note = {{"mapper", colmaps ? "colmap" : "global"},
                      {"colmap_asked_because", asked_because},
+                     {"doubt", doubt},
                      {"why_not_registered", why}};
   WriteFileAtomically(workspace.folder() / kOwnMappingNote,
                       note.dump(1, ' ', false, json::error_handler_t::replace) + "\n");
@@ -140,16 +151,76 @@ void WriteNote(const Workspace& workspace, const GloballyMapped& ours, bool colm
                   why, advice));
 }
 
-// COLMAP's models; where ours passes, a failure of COLMAP is no reason to lose it.
+// What helps where a model cannot be made sure of.
+std::string NextStep(const std::string& why) {
+  if (why.find("focal length") != std::string::npos) {
+    return "give the lens (`lens`), or `camera_per` photo where it was zoomed";
+  }
+  return "look whether the cameras stand where the photos were taken; else add photos in between, "
+         "that overlap by half, or give their cameras (`poses`)";
+}
+
+// Whether a model that does not pass is one to be looked at: most photos have a camera, and what
+// they see determines it. Of a camera that only turned there is none.
+bool IsModel(Workspace& workspace, const calib::SfmModel& model, const SfmOptions& options) {
+  constexpr size_t kFewest = 3;
+  const size_t photos = model.images.size();
+  if (photos < kFewest || 2 * photos < workspace.images().size() || model.points.empty()) {
+    return false;
+  }
+  if (CameraStoodStill(CountPairs(workspace))) return false;
+  try {
+    return UndeterminedOf(workspace, model, options).clause.empty();
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error&) {  // one that cannot even be adjusted
+    return false;
+  }
+}
+
+// The best of the models that do not pass; with its cameras come the words that it is one.
+std::optional<Doubtful> InDoubt(Workspace& workspace, const Own& own,
+                                std::optional<Doubtful> colmaps, const SfmOptions& options) {
+  Doubtful ours{own.mapped.model, own.mapped.why_not, false};
+  const bool colmaps_first =
+      colmaps && colmaps->model.images.size() > own.mapped.model.images.size();
+  for (const bool by_colmap : {colmaps_first, !colmaps_first}) {
+    if (by_colmap && !colmaps) continue;
+    const Doubtful& doubtful = by_colmap ? *colmaps : ours;
+    if (IsModel(workspace, doubtful.model, options)) return doubtful;
+  }
+  return std::nullopt;
+}
+
+// Takes such a model and says so; throws where there is none.
+std::vector<calib::SfmModel> TakeInDoubt(Workspace& workspace, const Own& own,
+                                         std::optional<Doubtful> colmaps, const SfmOptions& options,
+                                         const std::string& why, const char* advice) {
+  std::string all = why;
+  if (colmaps) all += ", and of COLMAP's model that " + colmaps->why;
+  auto taken = InDoubt(workspace, own, std::move(colmaps), options);
+  if (!taken) ThrowRejected(all, advice);
+  const std::string doubt = fmt::format("{}; {}", taken->why, NextStep(taken->why));
+  workspace.progress().Note(
+      fmt::format("structure from motion is not sure of these cameras: {}", doubt));
+  if (!taken->by_colmap) {
+    RemoveTree(workspace.folder() / kFixedIntrinsicsNote);
+    RemoveTree(workspace.folder() / kForwardMotionNote);
+  }
+  WriteNote(workspace, own.mapped, taken->by_colmap, why, doubt);
+  return {std::move(taken->model)};
+}
+
+// COLMAP's models; where there is one of ours, a failure of COLMAP is no reason to lose it.
 std::vector<calib::SfmModel> AskColmap(
-    Workspace& workspace, bool ours_passes,
+    Workspace& workspace, const std::function<bool()>& there_is_ours,
     const std::function<std::vector<calib::SfmModel>()>& by_colmap) {
   try {
     return by_colmap();
   } catch (const Interrupted&) {
     throw;
   } catch (const Error& error) {
-    if (!ours_passes) throw;
+    if (!there_is_ours()) throw;
     workspace.progress().Note(fmt::format("COLMAP's mapper failed: {}", error.what()));
     return {};
   }
@@ -235,7 +306,8 @@ std::vector<calib::SfmModel> MapOrFallBack(
   const std::string why = WhyAsked(workspace, own);
   const bool ask = CanAsk(workspace, options, why);
   if (!ask && !passes) {
-    ThrowRejected(why, options.engine == SfmEngine::kAuto
+    return TakeInDoubt(workspace, own, std::nullopt, options, why,
+                       options.engine == SfmEngine::kAuto
                            ? "photos must overlap by half, from several places; or install COLMAP "
                              "(apt-get install colmap), whose mapper is tried then"
                            : "photos must overlap by half, from several places; or use --sfm auto, "
@@ -245,16 +317,17 @@ std::vector<calib::SfmModel> MapOrFallBack(
   if (ask) {
     workspace.progress().Note(
         fmt::format("global mapper: {}; trying COLMAP's mapper on the same matches", why));
-    colmaps = AskColmap(workspace, passes, by_colmap);
+    colmaps = AskColmap(
+        workspace, [&] { return passes || IsModel(workspace, ours.model, options); }, by_colmap);
   }
-  if (colmaps.empty() && !passes) return {};
-  if (const std::string against = DropContradicted(workspace, groups, colmaps); !against.empty()) {
-    if (!passes) {
-      ThrowRejected(why + ", and of COLMAP's model that " + against,
-                    "photos must overlap by half, from several places");
-    }
-    workspace.progress().Note("COLMAP's model does not pass: " + against);
+  const bool made_none = colmaps.empty();
+  auto dropped = DropContradicted(workspace, groups, colmaps);
+  if (colmaps.empty() && !passes) {
+    if (made_none && !IsModel(workspace, ours.model, options)) return {};
+    return TakeInDoubt(workspace, own, std::move(dropped), options, why,
+                       "photos must overlap by half, from several places");
   }
+  if (dropped) workspace.progress().Note("COLMAP's model does not pass: " + dropped->why);
   const bool take = !colmaps.empty() && TakeColmaps(workspace, own, colmaps.front(), options);
   if (ask) {
     workspace.progress().Note(take ? "COLMAP's model is taken"
@@ -274,6 +347,7 @@ void ReadOwnMappingNote(const Workspace& workspace, SfmReport& report) {
   try {
     const json note = json::parse(ReadFile(file, kLargestNote));
     if (note.at("mapper") == "colmap") report.version += ", COLMAP's mapper";
+    report.doubt = note.value("doubt", "");
     for (const auto& [name, why] : note.at("why_not_registered").items()) {
       report.why_not_registered[name] = why.get<std::string>();
     }

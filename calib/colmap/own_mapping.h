@@ -17,7 +17,9 @@ namespace dtr::colmap {
 /// must agree with the matches (sfm/mapping/model_check.h); it is taken where ours did not pass,
 /// where the photos determine it and not ours, or where it has more photos and does not predict
 /// held-out observations clearly worse. What was decided is noted, and kept in the workspace.
-/// Throws Error where no model passes: the reason, and what helps. A model of photos with stations
+/// Where no model passes, the one with more photos of those that most photos have a camera in and
+/// that the photos determine is returned, with SfmReport::doubt; without such a one Error is
+/// thrown: the reason, and what helps. A model of photos with stations
 /// is returned untested, where there is one: only their stations make it what it is to be.
 std::vector<calib::SfmModel> MapOrFallBack(
     Workspace& workspace, const std::vector<CameraGroup>& groups, const SfmOptions& options,

@@ -132,7 +132,9 @@ struct SfmReport {
   /// Mapped with focal lengths of EXIF and no distortion, fixed: with free ones COLMAP made no
   /// model.
   bool fixed_intrinsics = false;
-  bool forward_motion = false;            ///< mapped with the thresholds of a walk straight ahead
+  bool forward_motion = false;  ///< mapped with the thresholds of a walk straight ahead
+  /// Why the cameras are not sure, and what helps, as a clause; empty where tests pass.
+  std::string doubt;
   double mean_reprojection_error_px = 0;  ///< over all observations, recomputed
 };
 

@@ -72,6 +72,9 @@ int RunCalibratePhotos(const CalibrateArguments& options, const Context& context
                                   options.output.string(), calibrated.model.images.size(),
                                   photos.photos.size(), calibrated.model.points.size()));
   SayNotRegistered(calibrated.not_registered, calibrated.why_not_registered, context.console);
+  if (const auto& sfm = calibrated.report.sfm; sfm && !sfm->doubt.empty()) {
+    context.console.Say("  calibration: FAILED: " + sfm->doubt);
+  }
   context.EmitJson(pipeline::ToJson(calibrated, photos.contents));
   return kDone;
 }

@@ -158,6 +158,7 @@ Json JsonOf(const CalibrationReport& report) {
     json["images_per_model"] = sfm->images_per_model;
     if (!sfm->lack_of_parallax.empty()) json["lack_of_parallax"] = sfm->lack_of_parallax;
     if (sfm->forward_motion) json["forward_motion"] = true;
+    if (!sfm->doubt.empty()) json["doubt"] = sfm->doubt;
     json["feature_image_size_px"] = sfm->feature_image_size_px;
   }
   json["points"] = report.points;
