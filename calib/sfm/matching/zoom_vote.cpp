@@ -11,6 +11,9 @@ namespace dtr::sfm::matching {
 namespace {
 
 constexpr int kZoomSteps = 30, kMaxTurns = 20;
+// Most photos were not zoomed: one that is off the common focal length by more than 3 % costs as
+// much as so many matches that nothing explains.
+constexpr double kZoomCost = 4, kLogSameFocal = 0.03;
 
 // The photos of the pairs, in order, and the pairs by their places in that.
 struct ZoomGraph {
@@ -62,16 +65,9 @@ GridCosts CostsOf(const std::vector<VotePair>& pairs, const VoteOptions& options
 // Per photo, an index into the grid.
 using Labels = std::vector<size_t>;
 
-double CostOfLabels(const ZoomGraph& graph, const GridCosts& costs, const Labels& labels) {
-  double cost = 0;
-  for (size_t p = 0; p < graph.ends.size(); ++p) {
-    cost += costs.At(p, labels[graph.ends[p].first], labels[graph.ends[p].second]).cost;
-  }
-  return cost;
-}
-
-// Photos take the label that suits their pairs best, in turn, until none changes.
-void TakeTurns(const ZoomGraph& graph, const GridCosts& costs, Labels& labels) {
+// Photos take the label that suits their pairs best, in turn, until none changes; another than
+// `common` is a zoom.
+void TakeTurns(const ZoomGraph& graph, const GridCosts& costs, size_t common, Labels& labels) {
   std::vector<std::vector<size_t>> pairs_of(graph.photos.size());
   for (size_t p = 0; p < graph.ends.size(); ++p) {
     pairs_of[graph.ends[p].first].push_back(p);
@@ -81,7 +77,7 @@ void TakeTurns(const ZoomGraph& graph, const GridCosts& costs, Labels& labels) {
     bool changed = false;
     for (size_t photo = 0; photo < labels.size(); ++photo) {
       const auto cost_at = [&](size_t label) {
-        double cost = 0;
+        double cost = label == common ? 0 : kZoomCost;
         for (const size_t p : pairs_of[photo]) {
           const auto [a, b] = graph.ends[p];
           cost += costs.At(p, a == photo ? label : labels[a], b == photo ? label : labels[b]).cost;
@@ -103,19 +99,18 @@ void TakeTurns(const ZoomGraph& graph, const GridCosts& costs, Labels& labels) {
   }
 }
 
-Labels BestLabels(const ZoomGraph& graph, const GridCosts& costs) {
-  Labels best;
-  double least = std::numeric_limits<double>::infinity();
-  for (size_t label = 0; label < costs.focals.size(); ++label) {
-    Labels labels(graph.photos.size(), label);
-    TakeTurns(graph, costs, labels);
-    const double cost = CostOfLabels(graph, costs, labels);
-    if (cost < least) {
-      least = cost;
-      best = std::move(labels);
-    }
+// What photos settle on from each label in common. Wide as the grid's scale is, the best of them
+// is not surely the start of the best solution.
+std::vector<std::pair<size_t, Labels>> Starts(const ZoomGraph& graph, const GridCosts& costs) {
+  std::vector<std::pair<size_t, Labels>> starts;
+  for (size_t common = 0; common < costs.focals.size(); ++common) {
+    Labels labels(graph.photos.size(), common);
+    TakeTurns(graph, costs, common, labels);
+    const auto same = [&](const auto& start) { return start.second == labels; };
+    if (std::any_of(starts.begin(), starts.end(), same)) continue;
+    starts.emplace_back(common, std::move(labels));
   }
-  return best;
+  return starts;
 }
 
 // Normal equations of a pair: pose, both focal lengths, k1.
@@ -160,21 +155,23 @@ PairNormal NormalOf(const VotePair& pair, const LensPair& at, const RelativePose
   return normal;
 }
 
-// All focal lengths, k1 and poses together; the last unknown is k1.
+// All focal lengths, k1 and poses together; the last unknowns are k1 and the common focal length.
 class ZoomSolve {
  public:
   struct State {
     std::vector<double> focals;
-    double k1 = 0;
+    double common = 1, k1 = 0;
     std::vector<RelativePose> poses;
   };
 
   ZoomSolve(const std::vector<VotePair>& pairs, const ZoomGraph& graph, const VoteOptions& options,
             State start)
       : pairs_(pairs), graph_(graph), options_(options), state_(std::move(start)) {
-    start_focals_ = state_.focals;
+    start_common_ = state_.common;
     cost_ = Cost(state_);
   }
+
+  double cost() const { return cost_; }  // with what priors cost
 
   ZoomResult Solve() {
     double damping = 1e-3;
@@ -214,11 +211,13 @@ class ZoomSolve {
   }
 
   double Cost(const State& state) const {
-    double squares = std::pow(state.k1 / kK1Deviation, 2);
-    for (size_t i = 0; i < state.focals.size(); ++i) {
-      squares += std::pow(std::log(state.focals[i] / start_focals_[i]) / kLogFocalDeviation, 2);
+    const double squares = std::pow(state.k1 / kK1Deviation, 2) +
+                           std::pow(std::log(state.common / start_common_) / kLogFocalDeviation, 2);
+    double zooms = 0;
+    for (const double focal : state.focals) {
+      zooms += RobustCost(std::pow(std::log(focal / state.common) / kLogSameFocal, 2));
     }
-    return DataCost(state) + kPriorNoise * kPriorNoise * squares;
+    return DataCost(state) + kPriorNoise * kPriorNoise * squares + kZoomCost * zooms;
   }
 
   // The reduced system of focal lengths and k1 with their priors, poses eliminated.
@@ -226,15 +225,13 @@ class ZoomSolve {
               std::vector<PairNormal>& normals) const {
     const auto photos = static_cast<long>(graph_.photos.size());
     const double noise = kPriorNoise * kPriorNoise;
-    const double focal = noise / (kLogFocalDeviation * kLogFocalDeviation);
-    h = focal * Eigen::MatrixXd::Identity(photos + 1, photos + 1);
-    g = Eigen::VectorXd::Zero(photos + 1);
-    for (long i = 0; i < photos; ++i) {
-      const auto at = static_cast<size_t>(i);
-      g[i] = focal * std::log(state_.focals[at] / start_focals_[at]);
-    }
+    h = Eigen::MatrixXd::Zero(photos + 2, photos + 2);
+    g = Eigen::VectorXd::Zero(photos + 2);
     h(photos, photos) = noise / (kK1Deviation * kK1Deviation);
     g[photos] = h(photos, photos) * state_.k1;
+    h(photos + 1, photos + 1) = noise / (kLogFocalDeviation * kLogFocalDeviation);
+    g[photos + 1] = h(photos + 1, photos + 1) * std::log(state_.common / start_common_);
+    for (long i = 0; i < photos; ++i) AddZoom(i, photos + 1, h, g);
     normals.resize(pairs_.size());
     ParallelFor(0, static_cast<int>(pairs_.size()), options_.threads, [&](int i) {
       const auto p = static_cast<size_t>(i);
@@ -246,10 +243,22 @@ class ZoomSolve {
       n.h.diagonal().head<5>().array() += 1e-9;
       AddReduced(n, p, photos, h, g);
     }
-    for (long i = 0; i <= photos; ++i) {
-      if (i < photos ? options_.focal_is_fixed : options_.k1_is_fixed) Fix(i, h, g);
+    for (long i = 0; i < photos + 2; ++i) {
+      if (i != photos ? options_.focal_is_fixed : options_.k1_is_fixed) Fix(i, h, g);
     }
     h.diagonal() *= 1 + damping;
+  }
+
+  void AddZoom(long photo, long common, Eigen::MatrixXd& h, Eigen::VectorXd& g) const {
+    const double r =
+        std::log(state_.focals[static_cast<size_t>(photo)] / state_.common) / kLogSameFocal;
+    const double root = 1 / (1 + r * r), weight = kZoomCost * root * root / kLogSameFocal;
+    h(photo, photo) += weight / kLogSameFocal + 1e-9;
+    h(common, common) += weight / kLogSameFocal;
+    h(photo, common) -= weight / kLogSameFocal;
+    h(common, photo) -= weight / kLogSameFocal;
+    g[photo] += weight * r;
+    g[common] -= weight * r;
   }
 
   void AddReduced(const PairNormal& n, size_t pair, long photos, Eigen::MatrixXd& h,
@@ -281,13 +290,15 @@ class ZoomSolve {
     Reduce(damping, h, g, normals);
     Eigen::VectorXd step = -h.ldlt().solve(g);
     if (!step.allFinite()) return false;
-    const long photos = step.size() - 1;
-    const double shorten = std::max(
-        {1.0, step.head(photos).cwiseAbs().maxCoeff() / 0.3, std::abs(step[photos]) / 0.1});
+    const long photos = step.size() - 2;
+    const double shorten =
+        std::max({1.0, step.head(photos).cwiseAbs().maxCoeff() / 0.3, std::abs(step[photos]) / 0.1,
+                  std::abs(step[photos + 1]) / 0.3});
     step /= shorten;
     State moved = state_;
     for (long i = 0; i < photos; ++i) moved.focals[static_cast<size_t>(i)] *= std::exp(step[i]);
     moved.k1 += step[photos];
+    moved.common *= std::exp(step[photos + 1]);
     for (size_t p = 0; p < normals.size(); ++p) {
       const PairNormal& n = normals[p];
       const Eigen::Vector3d of_pair(step[static_cast<long>(graph_.ends[p].first)],
@@ -329,7 +340,7 @@ class ZoomSolve {
   const ZoomGraph& graph_;
   const VoteOptions& options_;
   State state_;
-  std::vector<double> start_focals_;
+  double start_common_ = 1;
   double cost_ = 0;
 };
 
@@ -340,14 +351,23 @@ std::optional<ZoomResult> VoteOnZoom(const std::vector<VotePair>& pairs,
   if (pairs.empty()) return std::nullopt;
   const ZoomGraph graph = GraphOf(pairs);
   const GridCosts costs = CostsOf(pairs, options);
-  const Labels labels = BestLabels(graph, costs);
-  ZoomSolve::State start;
-  for (const size_t label : labels) start.focals.push_back(costs.focals[label]);
-  for (size_t p = 0; p < pairs.size(); ++p) {
-    start.poses.push_back(
-        costs.At(p, labels[graph.ends[p].first], labels[graph.ends[p].second]).pose);
+  std::optional<ZoomResult> best;
+  double least = std::numeric_limits<double>::infinity();
+  for (const auto& [common, labels] : Starts(graph, costs)) {
+    ZoomSolve::State start;
+    start.common = costs.focals[common];
+    for (const size_t label : labels) start.focals.push_back(costs.focals[label]);
+    for (size_t p = 0; p < pairs.size(); ++p) {
+      const auto [a, b] = graph.ends[p];
+      start.poses.push_back(costs.At(p, labels[a], labels[b]).pose);
+    }
+    ZoomSolve solve(pairs, graph, options, std::move(start));
+    ZoomResult result = solve.Solve();
+    if (!(solve.cost() < least)) continue;
+    least = solve.cost();
+    best = std::move(result);
   }
-  return ZoomSolve(pairs, graph, options, std::move(start)).Solve();
+  return best;
 }
 
 std::optional<ZoomResult> CostOfFocals(const std::vector<VotePair>& pairs,

@@ -20,11 +20,13 @@ struct ZoomResult {
   double cost = 0;                   ///< sum of RobustCost over all matches
 };
 
-/// Focal lengths of all photos of the pairs, each by itself, and one k1: those for which essential
-/// matrices explain the matches best. Every pair is posed for all focal lengths of a grid on either
-/// side; photos take turns for the best of them, from every start that has them equal; then
-/// Levenberg-Marquardt over focal lengths, k1 and poses together. Empty without pairs.
-/// Deterministic for any number of threads.
+/// Focal lengths of all photos of the pairs, and one k1: those for which essential matrices explain
+/// the matches best. Most photos are taken to have one focal length in common: one that is off it
+/// by more than a few percent costs as much as some matches that nothing explains. Every pair is
+/// posed for all focal lengths of a grid on either side; photos take turns for the best of them,
+/// from every start that has them equal; from each result Levenberg-Marquardt over focal lengths,
+/// k1 and poses together, of which the best is taken: small photos are explained nearly as well by
+/// long focal lengths. Empty without pairs. Deterministic for any number of threads.
 std::optional<ZoomResult> VoteOnZoom(const std::vector<VotePair>& pairs,
                                      const VoteOptions& options);
 
