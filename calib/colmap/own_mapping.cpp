@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 
 #include "calib/bundle/bundle.h"
 #include "calib/bundle/degeneracy.h"
@@ -265,6 +266,30 @@ bool MapsWithExifHeld(Workspace& workspace, const std::vector<CameraGroup>& grou
   return true;
 }
 
+// Whether another mapper may give cameras to photos that this model leaves out: COLMAP needs 30
+// points of the map in a photo, each of which is a match with a photo of it.
+bool MayBeExtended(const Workspace& workspace, const calib::SfmModel& model) {
+  constexpr size_t kFewestPoints = 30;
+  if (model.images.size() == workspace.images().size()) return false;
+  std::set<std::string> names;
+  for (const calib::SfmImage& image : model.images) names.insert(image.name);
+  const sfm::ViewGraph graph = ReadViewGraph(workspace.database());
+  std::vector<char> placed;
+  for (const sfm::GraphImage& image : graph.images) {
+    placed.push_back(names.contains(workspace.NameOfAlias(image.name)));
+  }
+  std::vector<size_t> matches(placed.size());
+  for (const sfm::PairGeometry& pair : graph.pairs) {
+    const auto a = static_cast<size_t>(pair.image_a), b = static_cast<size_t>(pair.image_b);
+    if (placed[a]) matches[b] += pair.matches.size();
+    if (placed[b]) matches[a] += pair.matches.size();
+  }
+  for (size_t i = 0; i < placed.size(); ++i) {
+    if (!placed[i] && matches[i] >= kFewestPoints) return true;
+  }
+  return false;
+}
+
 bool HasStations(const Workspace& workspace) {
   const auto& images = workspace.images();
   return std::any_of(images.begin(), images.end(),
@@ -299,7 +324,7 @@ std::vector<calib::SfmModel> MapOrFallBack(
                     MapsWithExifHeld(workspace, groups, options, own);
   const bool passes = own.Passes();
   const GloballyMapped& ours = own.mapped;
-  if (held || (own.IsAllThereIs() && ours.model.images.size() == workspace.images().size())) {
+  if (held || (own.IsAllThereIs() && !MayBeExtended(workspace, ours.model))) {
     WriteNote(workspace, ours, false, "");
     return {ours.model};
   }

@@ -228,7 +228,7 @@ void OwnMatches(Workspace& workspace, const fs::path& features,
   }
   for (size_t i = 0; i < workspace.images().size(); ++i) {
     const SfmImageInput& image = workspace.images()[i];
-    photos.push_back({workspace.AliasOf(i), image.width_px, image.height_px, group_of[i], {}});
+    photos.push_back({image.name, image.width_px, image.height_px, group_of[i], {}});
     photos.back().features.keypoints = ReadKeypoints(features, IdOf(i));
   }
   sfm::MatchOptions match;
@@ -247,10 +247,10 @@ void OwnMatches(Workspace& workspace, const fs::path& features,
   if (options.part) match.part = MatchPartOf(*options.part);
   match.progress = &workspace.progress();
   workspace.RunHere([&] {
-    const sfm::MatchResult result =
-        sfm::MatchPhotos(photos, known.lenses, known.focal_is_known, match);
+    sfm::MatchResult result = sfm::MatchPhotos(photos, known.lenses, known.focal_is_known, match);
     for (const std::string& note : result.notes) workspace.progress().Note(note);
     CopyDatabase(features, workspace.database());
+    for (size_t i = 0; i < photos.size(); ++i) result.graph.images[i].name = workspace.AliasOf(i);
     WriteViewGraph(workspace.database(), result.graph);
   });
   sfm::matching::PairJournal::Remove(match.journal);

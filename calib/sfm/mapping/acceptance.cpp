@@ -101,7 +101,7 @@ RelativeErrors RelativeErrorsOf(const ViewGraph& graph, const MapCameras& camera
 }
 
 // How many times the median error of all an image's is; 0 where it fits.
-double MisfitOf(const std::vector<double>& of_image, double median_of_all) {
+double MisfitOf(std::vector<double> of_image, double median_of_all) {
   const double median = UpperMedian(of_image);
   return median > std::max(kMaxMedianPx, 3 * median_of_all) ? median / median_of_all : 0;
 }
@@ -121,8 +121,7 @@ std::string WhyNotErrors(const MapEvidence& evidence, MapStatistics* statistics)
   statistics->observations = static_cast<int>(errors.size());
   statistics->error_median_px = UpperMedian(errors);
   statistics->error_rms_px = std::sqrt(sum / count);
-  const RelativeErrors relative =
-      RelativeErrorsOf(evidence.graph, evidence.cameras, evidence.points);
+  RelativeErrors relative = RelativeErrorsOf(evidence.graph, evidence.cameras, evidence.points);
   const double median = UpperMedian(relative.all);
   const double squares =
       std::inner_product(relative.all.begin(), relative.all.end(), relative.all.begin(), 0.0);
@@ -228,7 +227,7 @@ class Growth {
 
 std::vector<int> MisfitsOf(const ViewGraph& graph, const MapCameras& cameras,
                            std::span<const MapPoint> points) {
-  const RelativeErrors errors = RelativeErrorsOf(graph, cameras, points);
+  RelativeErrors errors = RelativeErrorsOf(graph, cameras, points);
   std::vector<int> misfits;
   if (errors.all.empty()) return misfits;
   const double median = UpperMedian(errors.all);

@@ -27,6 +27,9 @@ constexpr size_t kVotersOfPhoto = 4;   // at least, where every photo has a foca
 constexpr size_t kMinZoomed = 3;  // photos; of two, nothing tells whose focal length is another
 constexpr double kSureDeviation = 0.1, kContradiction = 1.15, kClearlyLower = 0.9;
 constexpr double kContradictionSigmas = 3;
+// What the matches of a set have wrong in common (a lens that k1 alone does not describe, features
+// that drift): of sets whose focal length is known, photos that face one way are off by up to 10 %.
+constexpr double kSystematicDeviation = 0.033;
 
 // Where the first radial term stands among a model's parameters; -1: it has none. Empty: a lens
 // that this vote has no model for.
@@ -254,17 +257,17 @@ std::optional<Decision> Decide(const Voters& voters, VoteOptions vote, bool know
   if (!free) return std::nullopt;
   if (!voters.on_focal) return Decision{free->lens, known, false, 0};
   const bool sure = free->log_focal_deviation < kSureDeviation;
-  Decision decision{free->lens, sure, sure, free->log_focal_deviation};
+  const double deviation = std::hypot(free->log_focal_deviation, kSystematicDeviation);
+  Decision decision{free->lens, sure, sure, deviation};
   if (sure && !known) return decision;
   vote.focal_is_fixed = true;
   const auto fixed = VoteOnLens(voters.pairs, vote);
   const double factor = std::abs(std::log(free->lens.focal / vote.prior_focal));
   if (known && sure && factor > std::log(kContradiction) &&
-      factor > kContradictionSigmas * free->log_focal_deviation &&
-      free->cost < kClearlyLower * fixed->cost) {
+      factor > kContradictionSigmas * deviation && free->cost < kClearlyLower * fixed->cost) {
     return decision;
   }
-  return Decision{fixed->lens, known, false, free->log_focal_deviation};
+  return Decision{fixed->lens, known, false, deviation};
 }
 
 VoteOptions VoteOptionsFor(const calib::LensCamera& prior, const MatchOptions& options) {

@@ -291,20 +291,23 @@ struct Wallpaper {
   Seen seen;
   Scene scene;
 };
-Wallpaper PhotographWallpaper(int photos_of_both) {
-  constexpr double kRepeat = 6;
+// A photo sees 4 units to each side.
+Wallpaper PhotographWallpaper(double repeat, int photos_of_both) {
   Wallpaper wallpaper{{}, {{testing::Lens()}, {}, {}, Box(500, {-2.5, -2, 5}, {2.5, 2, 7})}};
   Scene& scene = wallpaper.scene;
   const size_t pattern = scene.points.size();
   for (size_t p = 0; p < pattern; ++p) {
-    scene.points.push_back({scene.points[p].p + Vector3d(kRepeat, 0, 0), Vector3d::Zero()});
+    scene.points.push_back({scene.points[p].p + Vector3d(repeat, 0, 0), Vector3d::Zero()});
+  }
+  if (repeat > 6) {
+    for (const auto& p : Box(500, {2.5, -2, 5}, {repeat - 2.5, 2, 7}, 9)) scene.points.push_back(p);
   }
   for (int i = 0; i < 20; ++i) {
-    const double x = kRepeat * i / 19.0;
+    const double x = repeat * i / 19.0;
     scene.cam_from_world.push_back(LookAt({x, 0.5 * (i % 2), 0}, {x, 0, 6}));
   }
   for (int i = 0; i < photos_of_both; ++i) {
-    scene.cam_from_world.push_back(LookAt({1 + 2.0 * i, 1 - i, -5}, {3, 0, 6}));
+    scene.cam_from_world.push_back(LookAt({1 + 2.0 * i, 1.0 - i, -5}, {3, 0, 6}));
   }
   const GraphSpec spec;
   wallpaper.seen = GraphOf(scene, spec);
@@ -313,10 +316,11 @@ Wallpaper PhotographWallpaper(int photos_of_both) {
     for (int b = 15; b < 20; ++b) {
       std::vector<int> of_b;
       for (const int p : wallpaper.seen.shows[b]) {
-        of_b.push_back(p >= static_cast<int>(pattern) ? p - static_cast<int>(pattern) : -1);
+        const int first = p - static_cast<int>(pattern);
+        of_b.push_back(first >= 0 && first < static_cast<int>(pattern) ? first : -1);
       }
       Pose shifted = scene.cam_from_world[b];
-      shifted.translation += shifted.rotation * Vector3d(kRepeat, 0, 0);
+      shifted.translation += shifted.rotation * Vector3d(repeat, 0, 0);
       PairGeometry pair = testing::MatchPair(
           wallpaper.seen, a, b, of_b, shifted * scene.cam_from_world[a].Inverse(), spec, &random);
       wallpaper.seen.graph.pairs.push_back(pair);
@@ -328,12 +332,12 @@ Wallpaper PhotographWallpaper(int photos_of_both) {
 
 // That there are two of what looks alike shows where photos see both.
 TEST(GlobalMapper, PairsOfARepeatedPatternDoNotContradictAMapWhosePhotosSeeBothPlaces) {
-  const Wallpaper wallpaper = PhotographWallpaper(4);
+  const Wallpaper wallpaper = PhotographWallpaper(6, 4);
   ExpectSolved(MapGlobally(wallpaper.seen.graph, {}), wallpaper.scene);
 }
 
 TEST(GlobalMapper, WithoutSuchPhotosTheyDo) {
-  const Wallpaper wallpaper = PhotographWallpaper(0);
+  const Wallpaper wallpaper = PhotographWallpaper(12, 0);
   EXPECT_THAT(MapGlobally(wallpaper.seen.graph, {}).why_not, ::testing::HasSubstr("contradict"));
 }
 
