@@ -12,6 +12,7 @@
 
 #include "calib/models/radial_bend.h"
 #include "calib/solve/board_start.h"
+#include "calib/solve/term_uncertainty.h"
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/base/random.h"
@@ -197,22 +198,32 @@ std::string TextOf(const RadialBend& bend) {
       where, std::exp(bend.beyond_change), std::exp(bend.seen_change));
 }
 
-// Models that bend where no corner holds them do not count where another one explains held-out
-// views nearly as well.
-void RejectBent(std::span<const BoardView> views, std::vector<ModelScore>& scores) {
-  std::vector<RadialBend> bends(scores.size());
+// What speaks against a solution beside its error: it bends where no corner holds it, or corners
+// leave one of its coefficients open. Empty: nothing.
+std::string WhyImplausible(const BoardSolution& solution, std::span<const BoardView> views) {
+  const RadialBend bend = BendOf(solution, views);
+  if (!bend.Plausible()) return TextOf(bend);
+  const TermUncertainty term =
+      MostUncertainTerm(solution.model, solution.camera, solution.covariance);
+  if (term.share <= kMaxTermShare) return "";
+  return fmt::format("leaves {} open: it moves the image's corner by {:.0f} % of its distance",
+                     TextOfTerm(solution.model, solution.camera, solution.covariance, term.index),
+                     100 * term.share);
+}
+
+// Implausible models do not count where another one explains held-out views nearly as well.
+void RejectImplausible(std::span<const BoardView> views, std::vector<ModelScore>& scores) {
+  std::vector<std::string> why(scores.size());
   double least = std::numeric_limits<double>::infinity();
   for (size_t m = 0; m < scores.size(); ++m) {
     if (!scores[m].refused.empty()) continue;
-    bends[m] = BendOf(*scores[m].solution, views);
-    if (bends[m].Plausible()) least = std::min(least, scores[m].held_out_rms_px);
+    why[m] = WhyImplausible(*scores[m].solution, views);
+    if (why[m].empty()) least = std::min(least, scores[m].held_out_rms_px);
   }
   for (size_t m = 0; m < scores.size(); ++m) {
     ModelScore& score = scores[m];
-    if (!score.refused.empty() || bends[m].Plausible()) continue;
-    if (least <= kBendGivesWay * score.held_out_rms_px + kMinGainPx) {
-      score.refused = TextOf(bends[m]);
-    }
+    if (!score.refused.empty() || why[m].empty()) continue;
+    if (least <= kBendGivesWay * score.held_out_rms_px + kMinGainPx) score.refused = why[m];
   }
 }
 
@@ -266,7 +277,7 @@ ModelChoice ChooseModel(const Board& board, std::span<const BoardView> views, in
   for (size_t m = 0; m < choice.scores.size(); ++m) {
     if (choice.scores[m].refused.empty()) choice.scores[m].held_out_rms_px = Rms(errors[m], all);
   }
-  RejectBent(views, choice.scores);
+  RejectImplausible(views, choice.scores);
   std::vector<size_t> counting;
   for (size_t m = 0; m < choice.scores.size(); ++m) {
     if (choice.scores[m].refused.empty()) counting.push_back(m);

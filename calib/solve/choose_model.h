@@ -39,7 +39,7 @@ struct ModelChoice {
   size_t chosen = 0;
 };
 
-/// A model that bends beyond the corners seen gives way to one that does not, unless that one's RMS
+/// A model that bends beyond the corners seen, or is not determined, gives way to another, unless that one's RMS
 /// is this many times larger: then the lens is of its kind, and wants photos nearer to the border.
 inline constexpr double kBendGivesWay = 1.5;
 
@@ -56,7 +56,8 @@ bool NotSeparated(double rms_px, double min_px);
 /// 1993) reaches zero, or when the difference is below 10 % or 0.005 px: errors that all photos of
 /// a board share favour coefficients in held-out photos too. Chosen is the simplest of those. A
 /// model that bends or turns back between the outermost corner seen and the border of the image
-/// (radial_bend.h) does not count, unless all others err more (kBendGivesWay). Throws Error when
+/// (radial_bend.h), or of which corners leave a coefficient open (term_uncertainty.h), does not
+/// count, unless all others err more (kBendGivesWay). Throws Error when
 /// there are fewer than 5 views, or no model holds.
 ModelChoice ChooseModel(const Board& board, std::span<const BoardView> views, int width_px,
                         int height_px, const ChoiceOptions& options = {});

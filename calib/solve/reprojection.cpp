@@ -145,12 +145,16 @@ double BorderRadius(const LensCamera& camera) {
   return 0.5 * std::hypot(camera.width_px, camera.height_px) / camera.params[0];
 }
 
+std::vector<int> RadialTerms(BoardModel model) {
+  if (model == BoardModel::kBrown4) return {4, 5};
+  if (model == BoardModel::kBrown5) return {4, 5, 8};
+  if (model == BoardModel::kFisheye) return {4, 5, 6, 7};
+  return {};
+}
+
 std::unique_ptr<ceres::CostFunction> RadialPrior(const LensCoordinates& lens, double border_radius,
                                                  double sigma_px) {
-  std::vector<long> radial;
-  if (lens.model == BoardModel::kBrown4) radial = {4, 5};
-  if (lens.model == BoardModel::kBrown5) radial = {4, 5, 8};
-  if (lens.model == BoardModel::kFisheye) radial = {4, 5, 6, 7};
+  const std::vector<int> radial = RadialTerms(lens.model);
   if (radial.empty()) return nullptr;
   Eigen::MatrixXd by_theta =
       Eigen::MatrixXd::Zero(static_cast<long>(radial.size()), FreeParameterCount(lens.model));

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <memory>
+#include <vector>
 
 #include "calib/models/board_model.h"
 #include "dtr/types/pose.h"
@@ -24,12 +25,15 @@ struct LensCoordinates {
 LensCoordinates CoordinatesAround(BoardModel model, const LensCamera& camera,
                                   double largest_radius);
 
+/// Indices of a model's radial coefficients, of the lowest power first; none of a pinhole, which has
+/// no such coefficients, nor of brown8, whose mean something as a quotient only.
+std::vector<int> RadialTerms(BoardModel model);
+
 /// What is expected of radial coefficients before any corner is seen: that each displaces the
 /// image's corner, at `border_radius` on the plane of LensFormula, by 0 +- 30 % of its distance.
 /// Weighs as much as one corner of `sigma_px`, so it is felt only where corners say less than that
 /// about a coefficient: polynomials of high degree then stay near those of lower degree in place of
-/// following what is no lens. Parameter block theta. Null for a pinhole, which has no such
-/// coefficients, and for brown8, whose mean something as a quotient only.
+/// following what is no lens. Parameter block theta. Null where there are no RadialTerms.
 std::unique_ptr<ceres::CostFunction> RadialPrior(const LensCoordinates& lens, double border_radius,
                                                  double sigma_px);
 

@@ -67,6 +67,7 @@ class BoardValidator {
     TestStoredAgainstFresh();
     TestData();
     StepDone();
+    TestTerms();
     TestUncertainty();
     StepDone();
     TestHalves();
@@ -370,6 +371,32 @@ class BoardValidator {
     }
     return OtherModels(calibration_.board, own.model, own.camera.width_px, own.camera.height_px,
                        views, outliers, threads_);
+  }
+
+  // A coefficient of which the corners say little more than is known of any camera.
+  void TestTerms() {
+    if (!calibration_.free_lenses || calibration_.kept.empty()) return;
+    const char* name = "undetermined_terms";
+    if (!Base().solution) {
+      Add(NotTested(name, limits_.max_term_share, Base().refused));
+      return;
+    }
+    const RigSolution& solution = *Base().solution;
+    Check check = AtMost(name, 0, limits_.max_term_share, "no camera has a radial coefficient");
+    for (size_t c = 0; c < solution.rig.cameras.size(); ++c) {
+      const RigCamera& camera = solution.rig.cameras[c];
+      const int at = solution.layout.LensAt(c), count = FreeParameterCount(camera.model);
+      const Eigen::MatrixXd covariance = solution.covariance.block(at, at, count, count);
+      const TermUncertainty term = MostUncertainTerm(camera.model, camera.camera, covariance);
+      if (term.index < 0 || term.share <= check.value) continue;
+      check = AtMost(name, term.share, limits_.max_term_share,
+                     fmt::format("{}: {} ({}); its standard deviation moves the image's corner by "
+                                 "this share of its distance",
+                                 camera.name,
+                                 TextOfTerm(camera.model, camera.camera, covariance, term.index),
+                                 NameOf(camera.model)));
+    }
+    Add(std::move(check));
   }
 
   void TestUncertainty() {

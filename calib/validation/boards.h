@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calib/solve/rig_solve.h"
+#include "calib/solve/term_uncertainty.h"
 #include "calib/validation/patterns.h"
 #include "calib/validation/projection.h"
 #include "calib/validation/reprojection.h"
@@ -27,6 +28,7 @@ struct BoardLimits {
   double max_self_difference_sigmas = 0.5;
   double max_uncertainty_px = 0.5;  ///< at the boards' distance, in 95 % of the image
   double max_far_uncertainty_px = 1;
+  double max_term_share = kMaxTermShare;  ///< of a coefficient, worst camera: term_uncertainty.h
   double min_views = 8;       ///< per camera: two halves that can be solved
   double min_coverage = 0.5;  ///< share of 12 x 8 image regions with a corner, worst camera
   double min_tilt_deg = 15;   ///< largest angle between two boards, worst camera

@@ -138,7 +138,7 @@ std::string Conclusion(std::span<const Check> tests, Validated what) {
   std::copy_if(tests.begin(), tests.end(), std::back_inserter(failed),
                [](const Check& test) { return !test.passed; });
   if (failed.empty()) {
-    return fmt::format("validation {}: all {} tests are within their limits", ResultWord(true),
+    return fmt::format("validation {}: all tests ({}) are within their limits", ResultWord(true),
                        tests.size());
   }
   std::string named;
@@ -146,8 +146,9 @@ std::string Conclusion(std::span<const Check> tests, Validated what) {
     named += fmt::format("{}{} {}", i == 0 ? "" : ", ", failed[i].name, ValueAndLimit(failed[i]));
   }
   if (failed.size() > kNamed) named += fmt::format(" and {} more", failed.size() - kNamed);
-  return fmt::format("validation {}: {} of {} tests are beyond their limits: {}; {}",
-                     ResultWord(false), failed.size(), tests.size(), named,
+  return fmt::format("validation {}: {} of {} tests {}: {}; {}", ResultWord(false), failed.size(),
+                     tests.size(),
+                     failed.size() == 1 ? "is beyond its limit" : "are beyond their limits", named,
                      FirstRemedy(failed, what));
 }
 

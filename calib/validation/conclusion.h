@@ -14,7 +14,7 @@ enum class Validated { kBoards, kPhotos };
 /// "passed min_tilt_deg: 89.2 (at least 15): ...", as terminals show a test.
 std::string LineOf(const Check& test);
 
-/// "validation passed: all 19 tests are within their limits", or "validation FAILED: 2 of 19 tests:
+/// "validation passed: all tests (19) are within their limits", or "validation FAILED: 2 of 19 tests:
 /// min_views 5 (at least 8), ...; WHAT TO DO". The remedy is that of the failed test that explains
 /// the others. One sentence without a full stop.
 std::string Conclusion(std::span<const Check> tests, Validated what);

@@ -86,13 +86,13 @@ std::vector<double> ResidualsOf(const std::vector<Match>& matches,
 
 double Median(std::vector<double> values) { return UpperMedian(values); }
 
-double Loss(double residual_px, double scale_px) {
+double LossOf(double residual_px, double scale_px) {
   return scale_px * scale_px * std::log1p(std::pow(residual_px / scale_px, 2));
 }
 
 double MeanLoss(const std::vector<double>& residuals, double scale_px) {
   double sum = 0;
-  for (const double r : residuals) sum += Loss(r, scale_px);
+  for (const double r : residuals) sum += LossOf(r, scale_px);
   return sum / static_cast<double>(residuals.size());
 }
 
@@ -101,7 +101,7 @@ double SigmasFallen(const std::vector<double>& before, const std::vector<double>
                     double scale_px) {
   double sum = 0, squares = 0;
   for (size_t i = 0; i < before.size(); ++i) {
-    const double fell = Loss(before[i], scale_px) - Loss(after[i], scale_px);
+    const double fell = LossOf(before[i], scale_px) - LossOf(after[i], scale_px);
     sum += fell;
     squares += fell * fell;
   }

@@ -146,6 +146,36 @@ TEST(Refine, LeavesATrueModelAlone) {
   EXPECT_EQ(refined.model.cameras.at(1).params, model.cameras.at(1).params);
 }
 
+// One lens, zoomed photo by photo: every focal length is found, and no principal point or distortion
+// of each photo is freed for it.
+TEST(Refine, ALensForEveryImageFreesItsFocalLengthAlone) {
+  const auto zoom = [](size_t i) { return 1 + 0.4 * static_cast<double>(i % 3); };
+  SfmModel model = ModelFrom(MakeBundle(Noisy()));
+  const LensCamera lens = model.cameras.at(1);
+  const Eigen::Vector2d centre(lens.params[1], lens.params[2]);
+  for (size_t i = 0; i < model.images.size(); ++i) {
+    const auto id = static_cast<std::uint32_t>(i + 1);
+    model.images[i].camera_id = id;
+    model.cameras[id] = lens;
+    model.cameras[id].params[0] *= zoom(i) * (i % 2 == 0 ? 1.02 : 0.98);  // as they were voted
+    for (SfmFeature& feature : model.images[i].features) {
+      feature.pixel = centre + zoom(i) * (feature.pixel - centre);
+    }
+  }
+  RefineOptions options;
+  options.separate_lenses = true;
+  const Refined refined = Refine(model, options);
+  ASSERT_TRUE(refined.changed) << refined.reason;
+  EXPECT_EQ(refined.lens, LensFreedom::kFocal) << ToJson(refined);
+  for (size_t i = 0; i < model.images.size(); ++i) {
+    const LensCamera& found =
+        refined.model.cameras.at(refined.model.images[i].camera_id);
+    EXPECT_NEAR(found.params[0] / (900 * zoom(i)), 1, 0.004) << i;
+    EXPECT_EQ(found.params[1], lens.params[1]);
+    EXPECT_EQ(found.params[3], lens.params[3]);
+  }
+}
+
 TEST(Refine, TheSameForAnyNumberOfThreads) {
   SfmModel model = ModelFrom(MakeBundle(Noisy()));
   model.cameras[1].params[1] += 12;
