@@ -28,6 +28,20 @@ std::string ImageHash(const Photo& photo) {
          Sha256(std::as_bytes(std::span(read.mask.data())));
 }
 
+// `same_as`: the photos that go, and those that stay for them.
+std::vector<LeftOut> LeaveOut(const std::map<std::string, std::string>& same_as,
+                              const std::string& reason, Capture& capture) {
+  std::vector<LeftOut> left_out;
+  for (const auto& [name, kept] : same_as) {
+    left_out.push_back({name, kept});
+    capture.skipped.push_back({name, reason + kept});
+  }
+  std::erase_if(capture.photos, [&](const Photo& photo) { return same_as.contains(photo.name); });
+  std::sort(capture.skipped.begin(), capture.skipped.end(),
+            [](const Skipped& a, const Skipped& b) { return a.name < b.name; });
+  return left_out;
+}
+
 }  // namespace
 
 std::vector<LeftOut> DropSameImages(Capture& capture,
@@ -45,15 +59,29 @@ std::vector<LeftOut> DropSameImages(Capture& capture,
       if (name != kept && !preferred(name)) same_as[name] = kept;
     }
   }
-  std::vector<LeftOut> left_out;
-  for (const auto& [name, kept] : same_as) {
-    left_out.push_back({name, kept});
-    capture.skipped.push_back({name, "has the same pixels as " + kept});
+  return LeaveOut(same_as, "has the same pixels as ", capture);
+}
+
+std::vector<LeftOut> DropCopiesOf(std::vector<bool>& held_out, Capture& capture) {
+  const auto image_of = [](const Photo& photo) {
+    const bool is_copy = photo.screening && !photo.screening->duplicate_of.empty();
+    return is_copy ? photo.screening->duplicate_of : photo.name;
+  };
+  std::map<std::string, std::string> held_out_of;  // by image
+  for (size_t i = 0; i < capture.photos.size(); ++i) {
+    if (held_out[i]) held_out_of.emplace(image_of(capture.photos[i]), capture.photos[i].name);
   }
-  std::erase_if(capture.photos, [&](const Photo& photo) { return same_as.contains(photo.name); });
-  std::sort(capture.skipped.begin(), capture.skipped.end(),
-            [](const Skipped& a, const Skipped& b) { return a.name < b.name; });
-  return left_out;
+  std::map<std::string, std::string> same_as;
+  std::vector<bool> left;
+  for (size_t i = 0; i < capture.photos.size(); ++i) {
+    const Photo& photo = capture.photos[i];
+    const auto found = held_out_of.find(image_of(photo));
+    const bool goes = !held_out[i] && found != held_out_of.end();
+    if (goes) same_as[photo.name] = found->second;
+    if (!goes) left.push_back(held_out[i]);
+  }
+  held_out = std::move(left);
+  return LeaveOut(same_as, "shows the same image as a held-out photo, ", capture);
 }
 
 }  // namespace dtr::capture

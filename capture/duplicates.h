@@ -21,4 +21,9 @@ struct LeftOut {
 std::vector<LeftOut> DropSameImages(Capture& capture,
                                     const std::function<bool(const std::string&)>& preferred);
 
+/// Takes out the photos that screening says show the same image as one of `held_out` (per photo)
+/// and are not among these, and lists them under `skipped`: they would show what is held out.
+/// `held_out` loses their entries. Needs the screening of IngestPhotos.
+std::vector<LeftOut> DropCopiesOf(std::vector<bool>& held_out, Capture& capture);
+
 }  // namespace dtr::capture

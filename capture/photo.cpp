@@ -8,6 +8,7 @@
 #include <set>
 #include <utility>
 
+#include "capture/screening.h"
 #include "dtr/base/error.h"
 #include "dtr/base/memory_budget.h"
 
@@ -47,32 +48,61 @@ std::optional<Fault> FaultCalled(const std::string& name) {
   return {};
 }
 
-void DropFaulty(Capture& capture, const std::vector<Fault>& faults) {
+namespace {
+
+// Per photo whether it is the one that stays of those that show its image: the one that the others
+// are duplicates of, or, where that has one of `faults` itself, the best of the rest.
+std::vector<bool> StayOfTheirImage(const std::vector<Photo>& photos,
+                                   const std::vector<bool>& has_other_fault) {
   std::map<std::string, std::string> duplicate_of;
-  const auto original = [&](std::string name) {
+  for (const Photo& photo : photos) {
+    if (photo.screening && !photo.screening->duplicate_of.empty()) {
+      duplicate_of.emplace(photo.name, photo.screening->duplicate_of);
+    }
+  }
+  std::map<std::string, std::vector<size_t>> left_of;  // by the original's name
+  for (size_t i = 0; i < photos.size(); ++i) {
+    if (!photos[i].screening || has_other_fault[i]) continue;
+    std::string name = photos[i].name;
     for (auto at = duplicate_of.find(name); at != duplicate_of.end();
          at = duplicate_of.find(name)) {
       name = at->second;
     }
-    return name;
+    left_of[name].push_back(i);
+  }
+  std::vector<bool> stay(photos.size());
+  for (const auto& [original, left] : left_of) {
+    const auto at = std::find_if(left.begin(), left.end(),
+                                 [&](size_t i) { return photos[i].name == original; });
+    stay[at != left.end() ? *at : BestCopy(photos, left)] = true;
+  }
+  return stay;
+}
+
+}  // namespace
+
+void DropFaulty(Capture& capture, const std::vector<Fault>& faults) {
+  const auto drops = [&](Fault fault) {
+    return std::find(faults.begin(), faults.end(), fault) != faults.end();
   };
-  std::set<std::string> shown;  // originals whose image a photo that is kept shows
+  std::vector<bool> has_other_fault;
+  for (const Photo& photo : capture.photos) {
+    has_other_fault.push_back(
+        photo.screening &&
+        std::any_of(photo.screening->faults.begin(), photo.screening->faults.end(),
+                    [&](Fault fault) { return fault != Fault::kDuplicate && drops(fault); }));
+  }
+  const std::vector<bool> stays = StayOfTheirImage(capture.photos, has_other_fault);
   std::vector<Photo> kept;
-  for (Photo& photo : capture.photos) {
-    if (photo.screening && !photo.screening->duplicate_of.empty()) {
-      duplicate_of.emplace(photo.name, photo.screening->duplicate_of);
-    }
-    const std::string picture = original(photo.name);
+  for (size_t p = 0; p < capture.photos.size(); ++p) {
+    Photo& photo = capture.photos[p];
     std::string reason;
     for (size_t i = 0; photo.screening && i < photo.screening->faults.size(); ++i) {
       const Fault fault = photo.screening->faults[i];
-      if (std::find(faults.begin(), faults.end(), fault) == faults.end()) continue;
-      // The sharp retake of blurred photos that go: nothing else shows the image.
-      if (fault == Fault::kDuplicate && !shown.contains(picture)) continue;
+      if (!drops(fault) || (fault == Fault::kDuplicate && stays[p])) continue;
       reason += (reason.empty() ? "dropped: " : "; ") + photo.screening->remarks[i];
     }
     if (reason.empty()) {
-      shown.insert(picture);
       kept.push_back(std::move(photo));
     } else {
       capture.skipped.push_back({photo.name, reason});

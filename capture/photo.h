@@ -28,8 +28,8 @@ struct Screening {
   double sharpness = 0;
   double overexposed_share = 0;   ///< of the usable pixels: those with a channel at 254 or 255
   double underexposed_share = 0;  ///< pixels with all channels at 0 or 1
-  /// Name of the first photo with the same bytes, else of an earlier one that shows the same
-  /// image; empty where there is none.
+  /// Name of the best photo with the same bytes or of the same image (BestCopy); empty where it is
+  /// that itself.
   std::string duplicate_of;
   std::vector<Fault> faults;
   std::vector<std::string> remarks;  ///< one line for each fault, with the measure that says so
@@ -116,8 +116,8 @@ struct Capture {
   FolderContents contents;  ///< of the folder that the photos come from; counts alone if stored
 };
 
-/// Takes out the photos that have one of these faults and lists them under `skipped`. A duplicate
-/// of a photo that goes stays: it is the only one left of its image.
+/// Takes out the photos that have one of these faults and lists them under `skipped`. Where the one
+/// that others are duplicates of has another of them, the best of its duplicates stays.
 void DropFaulty(Capture& capture, const std::vector<Fault>& faults);
 
 /// What a camera group says of turned photos, with the orientation behind it.

@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <map>
+#include <system_error>
 #include <utility>
 
+#include "dtr/base/lower_case.h"
 #include "dtr/base/order_statistics.h"
 #include "dtr/types/area_average.h"
 #include "dtr/types/luma.h"
@@ -23,6 +26,7 @@ constexpr size_t kPhotosForAMedian = 3;
 constexpr int kThumbnailSidePx = 64;
 constexpr double kSameImage = 0.03;  // of the thumbnail's contrast
 constexpr size_t kPhotosLookedBackAt = 100;
+constexpr double kMoreBytes = 1.05;  // of one format: less was lost
 
 // Sums of a value and its square, exact within a row, rows added in their order.
 struct Moments {
@@ -73,20 +77,81 @@ void Add(Screening& screening, Fault fault, std::string remark) {
   screening.remarks.push_back(std::move(remark));
 }
 
-// An earlier photo that shows the same image as photos[index].
-void FindSameImage(std::vector<Photo>& photos, size_t index) {
-  Screening& screening = *photos[index].screening;
-  const double contrast = ContrastOf(screening.thumbnail);
-  const size_t first = index - std::min(index, kPhotosLookedBackAt);
-  for (size_t other = first; other < index; ++other) {
+// Photos of one image, rising, by the index of the first.
+using Copies = std::map<size_t, std::vector<size_t>>;
+
+// The first photo before photos[index] that shows the same image; `index` where there is none.
+size_t FirstOfImage(const std::vector<Photo>& photos, const std::vector<size_t>& first_of,
+                    size_t index) {
+  const Grid<std::uint16_t>& thumbnail = photos[index].screening->thumbnail;
+  if (thumbnail.empty()) return index;
+  const double limit = kSameImage * ContrastOf(thumbnail);
+  for (size_t other = index - std::min(index, kPhotosLookedBackAt); other < index; ++other) {
     const auto& earlier = photos[other].screening;
-    if (!earlier || earlier->thumbnail.empty() || !earlier->duplicate_of.empty()) continue;
-    const double difference = DifferenceOf(screening.thumbnail, earlier->thumbnail);
-    if (!(difference < kSameImage * contrast)) continue;
-    screening.duplicate_of = photos[other].name;
-    return Add(screening, Fault::kDuplicate,
-               fmt::format("shows the same image as {}: they differ by {:.1f} % of its contrast",
-                           photos[other].name, 100 * difference / contrast));
+    if (!earlier || earlier->thumbnail.empty() || first_of[other] != other) continue;
+    if (DifferenceOf(thumbnail, earlier->thumbnail) < limit) return other;
+  }
+  return index;
+}
+
+Copies FindCopies(const std::vector<Photo>& photos) {
+  std::map<std::string, size_t> first_with_content;
+  std::vector<size_t> first_of(photos.size());
+  Copies copies;
+  for (size_t i = 0; i < photos.size(); ++i) {
+    first_of[i] = i;
+    if (!photos[i].screening) continue;
+    const auto [same, is_new] = first_with_content.emplace(photos[i].source_sha256, i);
+    first_of[i] = is_new ? FirstOfImage(photos, first_of, i) : first_of[same->second];
+    copies[first_of[i]].push_back(i);
+  }
+  return copies;
+}
+
+bool HasCameraData(const Photo& photo) {
+  return photo.focal_prior_px || photo.gps || !photo.make.empty() || !photo.date_time.empty();
+}
+
+double BytesOf(const Photo& photo) {
+  std::error_code error;
+  const auto bytes = std::filesystem::file_size(photo.file, error);
+  return error ? 0 : static_cast<double>(bytes);
+}
+
+// Whether `a` is the better one of two photos of one image. Sharpness says little of a photo that
+// was compressed again, whose blocks have edges of their own, and nothing of one of another size.
+bool IsBetterCopy(const Photo& a, const Photo& b) {
+  const bool same_file = !a.source_sha256.empty() && a.source_sha256 == b.source_sha256;
+  if (same_file) return a.name.size() < b.name.size();  // "IMG_1 (1).jpg"
+  const auto pixels = [](const Photo& photo) {
+    return static_cast<std::int64_t>(photo.width_px) * photo.height_px;
+  };
+  if (pixels(a) != pixels(b)) return pixels(a) > pixels(b);
+  const double a_sharpness = a.screening->sharpness, b_sharpness = b.screening->sharpness;
+  if (b_sharpness < kBlurred * a_sharpness) return true;
+  if (a_sharpness < kBlurred * b_sharpness) return false;
+  if (HasCameraData(a) != HasCameraData(b)) return HasCameraData(a);
+  if (LowerExtension(a.file) != LowerExtension(b.file)) return false;
+  return BytesOf(a) > kMoreBytes * BytesOf(b);
+}
+
+void NameDuplicates(std::vector<Photo>& photos) {
+  for (const auto& [first, copies] : FindCopies(photos)) {
+    if (copies.size() < 2) continue;
+    const Photo& best = photos[BestCopy(photos, copies)];
+    for (const size_t i : copies) {
+      Photo& photo = photos[i];
+      if (&photo == &best) continue;
+      photo.screening->duplicate_of = best.name;
+      const Grid<std::uint16_t>& thumbnail = photo.screening->thumbnail;
+      Add(*photo.screening, Fault::kDuplicate,
+          photo.source_sha256 == best.source_sha256
+              ? "has the same bytes as " + best.name
+              : fmt::format("shows the same image as {}: they differ by {:.1f} % of its contrast",
+                            best.name,
+                            100 * DifferenceOf(thumbnail, best.screening->thumbnail) /
+                                ContrastOf(thumbnail)));
+    }
   }
 }
 
@@ -150,6 +215,14 @@ Grid<std::uint16_t> SmallLuma(const ImageRgb8& photo, int side_px) {
   return luma;
 }
 
+size_t BestCopy(const std::vector<Photo>& photos, const std::vector<size_t>& copies) {
+  size_t best = copies.front();
+  for (const size_t other : copies) {
+    if (IsBetterCopy(photos[other], photos[best])) best = other;
+  }
+  return best;
+}
+
 Screening MeasurePhoto(const ImageRgb8& photo, const Mask& mask) {
   Screening screening;
   screening.sharpness = Sharpness(photo, mask);
@@ -172,21 +245,16 @@ Screening MeasurePhoto(const ImageRgb8& photo, const Mask& mask) {
 
 void ScreenPhotos(std::vector<Photo>& photos) {
   const auto medians = MedianSharpnessByCamera(photos);
-  std::map<std::string, std::string> first_with_content;
-  for (size_t i = 0; i < photos.size(); ++i) {
-    const Photo& photo = photos[i];
+  for (Photo& photo : photos) {
     if (!photo.screening) continue;
-    Screening& screening = *photos[i].screening;
-    screening.duplicate_of.clear();
-    screening.faults.clear();
-    screening.remarks.clear();
-    const auto [first, is_new] = first_with_content.emplace(photo.source_sha256, photo.name);
-    if (!is_new) {
-      screening.duplicate_of = first->second;
-      Add(screening, Fault::kDuplicate, "has the same bytes as " + first->second);
-    } else if (!screening.thumbnail.empty()) {
-      FindSameImage(photos, i);
-    }
+    photo.screening->duplicate_of.clear();
+    photo.screening->faults.clear();
+    photo.screening->remarks.clear();
+  }
+  NameDuplicates(photos);
+  for (Photo& photo : photos) {
+    if (!photo.screening) continue;
+    Screening& screening = *photo.screening;
     const auto median = medians.find(photo.camera_group);
     if (median != medians.end() && screening.sharpness < kBlurred * median->second) {
       Add(screening, Fault::kBlurred,

@@ -16,10 +16,17 @@ Grid<std::uint16_t> SmallLuma(const ImageRgb8& photo, int side_px);
 /// the mask leaves out counts in no share and no sharpness; empty: all of the photo is usable.
 Screening MeasurePhoto(const ImageRgb8& photo, const Mask& mask = {});
 
+/// Of photos of one image (indices, rising) the one to use: not blurred or merely enlarged (less
+/// than a quarter of another's sharpness), of the most pixels, with a camera's EXIF data, of the
+/// most bytes (of one format; a messenger's copy is smaller), the first; of equal files the one
+/// with the shortest name. All screened.
+size_t BestCopy(const std::vector<Photo>& photos, const std::vector<size_t>& copies);
+
 /// Compares the photos with each other: names duplicates, faults and remarks, in place of those
-/// that were there. A photo is a duplicate of an earlier one that has the same bytes, or of one
-/// among the 100 before it whose thumbnail differs by less than 3 % of its own contrast (root mean
-/// squares): an image that moved by more than about 0.15 % of its width differs by more.
+/// that were there. Photos show one image where they have the same bytes, or where the thumbnail of
+/// one among the 100 before differs by less than 3 % of the later one's contrast (root mean
+/// squares): an image that moved by more than about 0.15 % of its width differs by more. All of
+/// them are duplicates of their BestCopy.
 void ScreenPhotos(std::vector<Photo>& photos);
 
 }  // namespace dtr::capture

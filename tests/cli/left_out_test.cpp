@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/colmap/model_io.h"
+#include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "pipeline/detail/depth/depth_precision.h"
 #include "tests/calib/colmap/fake_colmap.h"
@@ -112,6 +113,33 @@ TEST_F(LeftOut, APhotoThatIsThereTwice) {
   EXPECT_THAT(kept.err,
               HasSubstr("not registered: 0006.jpg: 100 features, fewer than 15 of them in "
                         "any other photo"));
+}
+
+// A messenger's copy: as large, compressed once more.
+void CopyByMessenger(const fs::path& photo, const fs::path& copy) {
+  io::WriteImage(copy, io::ReadImage(photo), 75);
+}
+
+TEST_F(LeftOut, WhatShowsAHeldOutPhotoAgain) {
+  CopyByMessenger(Photos() / "0003.jpg", Photos() / "0003-chat.jpg");
+  {
+    colmap::testing::FakeColmap colmap;
+    LeaveModel(colmap);
+    const std::string line =
+        "0003-chat.jpg left out: it shows the same image as the held-out photo 0003.jpg";
+    const Ran ran = Build({"--engine", "none", "--holdout", "0003.jpg", "--json", "-"});
+    EXPECT_THAT(ran.err, HasSubstr(line));
+    EXPECT_THAT(Log(), Contains(line));
+    EXPECT_EQ(Json::parse(ran.out)["skipped"][0]["name"], "0003-chat.jpg");
+    EXPECT_EQ(Views(), kCourtyardViews);
+  }
+  const fs::path few = folder_ / "few";
+  fs::create_directories(few);
+  for (const char* name : {"0001.jpg", "0003.jpg", "0003-chat.jpg"}) {
+    fs::copy_file(Photos() / name, few / name);
+  }
+  ExpectRejected(Dtr({"build", few.string(), "-o", Set(), "--force", "--holdout", "0003.jpg"}),
+                 kWrongUsage, "photos to build from that show something else than held-out ones");
 }
 
 TEST_F(LeftOut, FloatsWhere16BitsHold) {

@@ -107,13 +107,33 @@ capture::Capture FramesOf(const BuildOptions& options, const std::filesystem::pa
 
 // Photos that are there twice add nothing, and would show what is held out. Given places say that
 // they are photos of their own; those of a rig belong to its time steps.
+bool MayLeaveOutCopies(const BuildOptions& options) {
+  return !options.keep_duplicates && options.poses.empty() && options.rig.empty();
+}
+
 void LeaveOutSameImages(const BuildOptions& options, capture::Capture& photos, Progress& progress) {
-  if (options.keep_duplicates || !options.poses.empty() || !options.rig.empty()) return;
+  if (!MayLeaveOutCopies(options)) return;
   const auto left_out = capture::DropSameImages(
       photos, [&](const std::string& name) { return IsNamed(options.holdout, name); });
   for (const auto& [name, same_as] : left_out) {
     progress.Note(name + " left out: it has the same pixels as " + same_as);
   }
+}
+
+// What shows a held-out photo again, smaller or compressed once more, would make figures too good.
+void LeaveOutCopiesOfHeldOut(const BuildOptions& options, BuildInputs& inputs, Progress& progress) {
+  const std::vector<capture::Photo>& photos = inputs.photos.photos;
+  // Views of a panorama belong together.
+  if (!MayLeaveOutCopies(options) || (!photos.empty() && photos.front().face)) return;
+  for (const auto& [name, same_as] : capture::DropCopiesOf(inputs.held_out, inputs.photos)) {
+    progress.Note(name + " left out: it shows the same image as the held-out photo " + same_as);
+  }
+  const auto sources = std::count(inputs.held_out.begin(), inputs.held_out.end(), false);
+  if (sources >= 2) return;
+  throw UsageError(fmt::format(
+      "`holdout` {}: expected at least 2 photos to build from that show something else than "
+      "held-out ones, found {}",
+      options.holdout, sources));
 }
 
 // Of the cameras and of the lists that their reader takes in.
@@ -141,6 +161,7 @@ void TestPhotos(const BuildOptions& options, BuildInputs& inputs, Progress& prog
     TakePhotosAsCamerasDo(options.poses, options.poses_format, photos, progress);
   }
   inputs.held_out = HeldOutOf(options.holdout, photos);
+  LeaveOutCopiesOfHeldOut(options, inputs, progress);
   if (options.poses.empty()) {
     if (auto panoramas = RigOfPanoramas(photos)) {
       RequirePanoramaOptions(options);
