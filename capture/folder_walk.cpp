@@ -124,10 +124,10 @@ class Walker {
       return;
     }
     if (!recurse_) return;
-    const std::string why_not = WhyNotSearched(path);
     std::error_code ignored;
-    if (!why_not.empty()) {
-      walk_.skipped.push_back({PrintableName(name), why_not});
+    if (IsOwnFolder(path)) {
+      Ignore("own_folders", "files of folders that dtr made", "", PrintableName(name) + "/",
+             FilesBelow(path));
     } else if (fs::is_symlink(path, ignored)) {
       links_.insert(name);
     } else if (MarkRead(path)) {

@@ -18,7 +18,7 @@ struct FolderWalk {
   FolderContents contents;  ///< what is ignored
 };
 
-/// Walks a folder, and with `recurse` those below it that WhyNotSearched lets in, links to folders
+/// Walks a folder, and with `recurse` those below it that are not IsOwnFolder, links to folders
 /// among them; a folder that several ways lead to is read once, by the first of them. Files and
 /// folders that systems leave behind (hidden ones, thumbnails of servers, resource forks) are
 /// ignored. Throws Error when the folder cannot be listed.

@@ -187,18 +187,17 @@ void Announce(Capture& capture, Progress& progress) {
 
 }  // namespace
 
-std::string WhyNotSearched(const fs::path& folder) {
+bool IsOwnFolder(const fs::path& folder) {
   std::error_code ignored;
   const std::string name = folder.filename().string();
-  if (name.ends_with(".dtr") || name.ends_with(".partial") || name.ends_with(".partial.work") ||
-      fs::exists(folder / "set.json", ignored)) {
-    return "is a D+TR set, not photos";
+  if (name.ends_with(".dtr") || name.ends_with(".partial") || name.ends_with(".partial.work")) {
+    return true;
   }
-  if (fs::exists(folder / kCaptureFile, ignored)) return "is a capture of its own";
-  if (fs::exists(folder / WorkFolder::MarkOf(kCalibrationKind), ignored)) {
-    return "is the workspace of a calibration";
+  for (const std::string& mark : {std::string("set.json"), std::string(kCaptureFile),
+                                  std::string(kExportFile), WorkFolder::MarkOf(kCalibrationKind)}) {
+    if (fs::exists(folder / mark, ignored)) return true;
   }
-  return "";
+  return false;
 }
 
 FolderContents ContentsOf(const fs::path& folder, bool recurse) {

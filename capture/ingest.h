@@ -40,9 +40,10 @@ FolderContents ContentsOf(const std::filesystem::path& folder, bool recurse);
 /// The same by the kinds of files alone: every image counts as a photo.
 FolderContents ContentsOfFiles(const std::filesystem::path& folder, bool recurse);
 
-/// Why a folder below one of photos is not looked into: it holds images that we
-/// made ourselves (a set, a capture, a workspace, unfinished work). Empty: it is.
-std::string WhyNotSearched(const std::filesystem::path& folder);
+/// Whether a folder is one that this program made: a set, a capture, an export (kExportFile), the
+/// workspace of a calibration, unfinished work. Its images are photos, or made from them, that lie
+/// elsewhere.
+bool IsOwnFolder(const std::filesystem::path& folder);
 
 /// A focal length in pixels and where it comes from.
 struct FocalPrior {

@@ -9,6 +9,7 @@
 #include "capture/layout_names.h"
 #include "capture/names.h"
 #include "dtr/base/lower_case.h"
+#include "dtr/io/rendered_mark.h"
 
 namespace dtr::capture {
 namespace fs = std::filesystem;
@@ -51,6 +52,7 @@ class Sorter {
   }
 
   Layout Sort() {
+    TakeRendered();
     TakeMaskFiles();
     TakeRawFiles();
     TakeProgramOutput();
@@ -66,6 +68,7 @@ class Sorter {
   }
 
  private:
+  void TakeRendered();
   void TakeMaskFiles();
   void TakeRawFiles();
   void TakeProgramOutput();
@@ -117,6 +120,18 @@ void Sorter::Take(const std::string& name, ImageKind kind) {
       return Ignore(name, "label_maps", "label maps", "");
     case ImageKind::kPreview:
       return Ignore(name, "previews", "previews", "");
+  }
+}
+
+// Of a folder that holds nothing else they are what was asked for.
+void Sorter::TakeRendered() {
+  std::vector<std::string> rendered;
+  for (const std::string& name : rest_) {
+    if (io::IsRendered(top_ / name)) rendered.push_back(name);
+  }
+  if (rendered.size() == rest_.size()) return;
+  for (const std::string& name : rendered) {
+    Ignore(name, "rendered_images", "images that dtr rendered", "give their folder to use them");
   }
 }
 

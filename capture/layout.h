@@ -22,7 +22,8 @@ struct Layout {
 /// Meshroom, OpenDroneMap, RGB-D recorders and others lay them out.
 ///
 /// Images belong together when their names are equal but for words for a kind of image (images,
-/// masks, depth, normals, ...) in the name or in the folders above. Among them are
+/// masks, depth, normals, ...) in the name or in the folders above. Images that say that they were
+/// rendered (io::IsRendered) are none, unless all do. Among the others are
 /// - masks: NAME_mask.EXT beside NAME.EXT; else grey images called masks, or of two values only
 ///   (0 and 255) in a folder beside the photos, of the photo's size. They become the masks of their
 ///   photos;

@@ -10,6 +10,8 @@ namespace dtr::capture {
 
 /// Name of the file that makes a folder a capture.
 inline constexpr char kCaptureFile[] = "capture.json";
+/// Name of the file that `dtr export` leaves in the folders that it writes.
+inline constexpr char kExportFile[] = "dtr-export.json";
 /// What is made in the workspace of `dtr calibrate photos` (WorkFolder's KIND): it holds images
 /// that are no photos.
 inline constexpr char kCalibrationKind[] = "calibration";

@@ -39,6 +39,7 @@ ExportReport ExportColmap(const ExportRequest& request, Progress& progress) {
   ExportImages(request.set, set, work.path() / "images");
   colmap::WriteModel(work.path() / "sparse" / "0", model,
                      request.text ? colmap::Format::kText : colmap::Format::kBinary);
+  MarkExport(set, "colmap", work.path());
   work.Become(output);
   report.images = model.images.size();
   report.points = model.points.size();

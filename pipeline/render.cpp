@@ -48,9 +48,9 @@ class FrameSink {
     const fs::path file = folder_ ? output_ / FileOf(camera) : output_;
     // What no view saw is black with alpha 0, unless it was filled.
     if (filled || LowerExtension(file) != ".png") {
-      io::WriteImage(file, result.image);
+      io::WriteImage(file, result.image, io::kDefaultJpegQuality, io::Mark::kRendered);
     } else {
-      io::WriteImageWithAlpha(file, result.image, result.coverage);
+      io::WriteImageWithAlpha(file, result.image, result.coverage, io::Mark::kRendered);
     }
     return file.string();
   }
@@ -81,8 +81,11 @@ void RequireOneOutput(const RenderRequest& request) {
 }
 
 void WritePlanes(const RenderRequest& request, const RenderResult& result) {
-  if (!request.depth_out.empty()) io::WriteExr(request.depth_out, result.depth.grid(), false);
-  if (!request.coverage_out.empty()) io::WriteMask(request.coverage_out, result.coverage);
+  const io::Mark mark = io::Mark::kRendered;
+  if (!request.depth_out.empty()) {
+    io::WriteExr(request.depth_out, result.depth.grid(), false, mark);
+  }
+  if (!request.coverage_out.empty()) io::WriteMask(request.coverage_out, result.coverage, mark);
 }
 
 // When playing, one camera sees every frame of the set.

@@ -253,7 +253,7 @@ Videos VideosOf(const fs::path& source) {
     if (path.filename().string().front() == '.') continue;
     std::error_code ignored;
     if (entries->is_directory(ignored)) {
-      if (WhyNotSearched(path).empty()) return {};  // photos may lie below
+      if (!IsOwnFolder(path)) return {};  // photos may lie below
       continue;
     }
     if (IsImageExtension(path.extension().string())) return {};

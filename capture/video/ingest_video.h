@@ -23,7 +23,7 @@ struct VideoOptions {
 };
 
 /// `source` itself where it is a video; the videos of a folder that has neither photos nor folders
-/// beside them in which photos are looked for (WhyNotSearched), in byte order of their names, and
+/// beside them in which photos are looked for (not IsOwnFolder), in byte order of their names, and
 /// of videos and proxies the videos; else nothing.
 std::vector<std::filesystem::path> VideosOf(const std::filesystem::path& source);
 

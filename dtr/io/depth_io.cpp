@@ -203,11 +203,12 @@ Grid<std::uint16_t> ReadCodes(const fs::path& file, int width_px, int height_px,
 constexpr int kSigmaBits = 16;  // the upper ones of float32 hold eight significant bits
 
 void WriteFloats(const fs::path& file, const Grid<float>& grid,
-                 const std::vector<std::string>& channels, TypeDesc type) {
+                 const std::vector<std::string>& channels, TypeDesc type, Mark mark) {
   ImageSpec spec(grid.width(), grid.height(), grid.channels(), type);
   spec.channelnames = channels;
   spec.attribute("compression", "zip");
   spec.attribute("DateTime", "");  // else OpenImageIO writes the time of day
+  if (mark == Mark::kRendered) spec.attribute("Software", kRenderedSoftware);
   WriteFileAtomically(file, EncodeImage(".exr", spec, TypeDesc::FLOAT, grid.data().data()));
 }
 
@@ -217,7 +218,7 @@ Grid<float> ReadFloatGrid(const fs::path& file, std::uint64_t limit_px) {
   return ReadFloatsOf(*OpenImage(file, {limit_px}), file);
 }
 
-void WriteExr(const fs::path& file, const Grid<float>& grid, bool half) {
+void WriteExr(const fs::path& file, const Grid<float>& grid, bool half, Mark mark) {
   if (grid.empty() || grid.channels() != 1) {
     throw Error(file.string() + ": expected one channel of floats to write");
   }
@@ -229,14 +230,14 @@ void WriteExr(const fs::path& file, const Grid<float>& grid, bool half) {
       }
     }
   }
-  WriteFloats(file, grid, {"Y"}, half ? TypeDesc::HALF : TypeDesc::FLOAT);
+  WriteFloats(file, grid, {"Y"}, half ? TypeDesc::HALF : TypeDesc::FLOAT, mark);
 }
 
-void WriteExrOfVectors(const fs::path& file, const Grid<float>& grid) {
+void WriteExrOfVectors(const fs::path& file, const Grid<float>& grid, Mark mark) {
   if (grid.empty() || grid.channels() != 3) {
     throw Error(file.string() + ": expected three channels of floats to write");
   }
-  WriteFloats(file, grid, {"X", "Y", "Z"}, TypeDesc::FLOAT);
+  WriteFloats(file, grid, {"X", "Y", "Z"}, TypeDesc::FLOAT, mark);
 }
 
 Grid<std::uint16_t> ReadPng16(const fs::path& file, std::uint64_t limit_px) {

@@ -19,10 +19,12 @@ Grid<float> ReadFloatGrid(const std::filesystem::path& file,
 
 /// Writes one channel named Y, ZIP, float32 or half; deterministic bytes. With `half`, values that
 /// half cannot hold (|v| > 65504) are rejected. Throws Error.
-void WriteExr(const std::filesystem::path& file, const Grid<float>& grid, bool half = false);
+void WriteExr(const std::filesystem::path& file, const Grid<float>& grid, bool half = false,
+              Mark mark = Mark::kNone);
 
 /// Writes three channels named X, Y, Z, ZIP, float32; deterministic bytes. Throws Error.
-void WriteExrOfVectors(const std::filesystem::path& file, const Grid<float>& grid);
+void WriteExrOfVectors(const std::filesystem::path& file, const Grid<float>& grid,
+                       Mark mark = Mark::kNone);
 
 /// 16-bit grey PNG, values as stored. Throws Error when the file is not one channel of 16 bits.
 Grid<std::uint16_t> ReadPng16(const std::filesystem::path& file,

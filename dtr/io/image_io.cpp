@@ -144,9 +144,16 @@ void ExpectRgb(const fs::path& file, const ImageRgb8& image) {
   }
 }
 
-ImageSpec Rgb8Spec(const ImageRgb8& image) {
-  return {image.width(), image.height(), 3, TypeDesc::UINT8};
+ImageSpec Spec8(int width, int height, int channels, Mark mark) {
+  ImageSpec spec(width, height, channels, TypeDesc::UINT8);
+  if (mark == Mark::kRendered) spec.attribute("Software", kRenderedSoftware);
+  return spec;
 }
+
+ImageSpec Rgb8Spec(const ImageRgb8& image, Mark mark = Mark::kNone) {
+  return Spec8(image.width(), image.height(), 3, mark);
+}
+
 
 std::string EncodeJpeg(const ImageRgb8& image, int quality, ImageSpec spec) {
   spec.attribute("CompressionQuality", std::clamp(quality, 1, 100));
@@ -275,22 +282,22 @@ Mask ReadMask(const fs::path& file, std::uint64_t limit_px, double memory_gb) {
   return mask;
 }
 
-void WriteImage(const fs::path& file, const ImageRgb8& image, int jpeg_quality) {
+void WriteImage(const fs::path& file, const ImageRgb8& image, int jpeg_quality, Mark mark) {
   ExpectRgb(file, image);
   const std::string extension = LowerExtension(file);
   if (extension == ".png") {
-    WritePng(file, image);
+    WriteFileAtomically(file, EncodePng(image, mark));
   } else if (extension == ".jpg" || extension == ".jpeg") {
-    WriteFileAtomically(file, EncodeJpeg(image, jpeg_quality, Rgb8Spec(image)));
+    WriteFileAtomically(file, EncodeJpeg(image, jpeg_quality, Rgb8Spec(image, mark)));
   } else {
     throw UsageError(file.string() + ": expected a name ending in .png or .jpg, found '" +
                      extension + "'");
   }
 }
 
-std::string EncodePng(const ImageRgb8& image) {
+std::string EncodePng(const ImageRgb8& image, Mark mark) {
   ExpectRgb("PNG", image);
-  return EncodeImage(".png", Rgb8Spec(image), TypeDesc::UINT8, image.data().data());
+  return EncodeImage(".png", Rgb8Spec(image, mark), TypeDesc::UINT8, image.data().data());
 }
 
 void WritePng(const fs::path& file, const ImageRgb8& image) {
@@ -298,7 +305,8 @@ void WritePng(const fs::path& file, const ImageRgb8& image) {
   WriteFileAtomically(file, EncodePng(image));
 }
 
-void WriteImageWithAlpha(const fs::path& file, const ImageRgb8& image, const Mask& alpha) {
+void WriteImageWithAlpha(const fs::path& file, const ImageRgb8& image, const Mask& alpha,
+                         Mark mark) {
   ExpectRgb(file, image);
   if (LowerExtension(file) != ".png") {
     throw UsageError(file.string() + ": expected a name ending in .png, as alpha needs PNG");
@@ -312,16 +320,16 @@ void WriteImageWithAlpha(const fs::path& file, const ImageRgb8& image, const Mas
     for (size_t c = 0; c < 3; ++c) rgba.data()[4 * i + c] = image.data()[3 * i + c];
     rgba.data()[4 * i + 3] = alpha.data()[i];
   }
-  ImageSpec spec(image.width(), image.height(), 4, TypeDesc::UINT8);
+  ImageSpec spec = Spec8(image.width(), image.height(), 4, mark);
   spec.attribute("oiio:UnassociatedAlpha", 1);
   WriteFileAtomically(file, EncodeImage(".png", spec, TypeDesc::UINT8, rgba.data().data()));
 }
 
-void WriteMask(const fs::path& file, const Mask& mask) {
+void WriteMask(const fs::path& file, const Mask& mask, Mark mark) {
   if (mask.empty() || mask.channels() != 1) {
     throw Error(file.string() + ": expected a mask of 1 channel to write");
   }
-  const ImageSpec spec(mask.width(), mask.height(), 1, TypeDesc::UINT8);
+  const ImageSpec spec = Spec8(mask.width(), mask.height(), 1, mark);
   WriteFileAtomically(file, EncodeImage(".png", spec, TypeDesc::UINT8, mask.data().data()));
 }
 

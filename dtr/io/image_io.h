@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dtr/io/panorama_xmp.h"
+#include "dtr/io/rendered_mark.h"
 #include "dtr/types/grid.h"
 
 namespace dtr::io {
@@ -131,23 +132,24 @@ Mask ReadMask(const std::filesystem::path& file, std::uint64_t limit_px = kImage
 inline constexpr int kDefaultJpegQuality = 95;
 
 /// Writes a PNG (lossless) or JPEG (4:4:4, `jpeg_quality` 1..100), by the file's extension.
-/// Atomic, and the same bytes for the same image: no times, no names.
+/// Atomic, and the same bytes for the same image: no times, no names. `mark`: what the file says
+/// of itself.
 /// Throws UsageError for another extension, Error when the file cannot be written.
 void WriteImage(const std::filesystem::path& file, const ImageRgb8& image,
-                int jpeg_quality = kDefaultJpegQuality);
+                int jpeg_quality = kDefaultJpegQuality, Mark mark = Mark::kNone);
 
 /// A PNG file in memory. Throws Error where the image has not 3 channels.
-std::string EncodePng(const ImageRgb8& image);
+std::string EncodePng(const ImageRgb8& image, Mark mark = Mark::kNone);
 
 /// The same as PNG, whatever the file is called.
 void WritePng(const std::filesystem::path& file, const ImageRgb8& image);
 
 /// Writes a PNG with an alpha channel (not multiplied in). `alpha` must have the image's size.
 void WriteImageWithAlpha(const std::filesystem::path& file, const ImageRgb8& image,
-                         const Mask& alpha);
+                         const Mask& alpha, Mark mark = Mark::kNone);
 
 /// Writes an 8-bit grey PNG.
-void WriteMask(const std::filesystem::path& file, const Mask& mask);
+void WriteMask(const std::filesystem::path& file, const Mask& mask, Mark mark = Mark::kNone);
 
 /// What a camera would have written about its lens.
 struct ExifFocal {

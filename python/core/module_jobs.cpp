@@ -8,6 +8,7 @@
 
 #include "cli/run_command.h"
 #include "dtr/base/error.h"
+#include "dtr/base/files.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/image_io.h"
 #include "dtr/report/contact_sheet.h"
@@ -83,20 +84,22 @@ void RequireShape(const py::array& array, py::ssize_t dimensions, py::ssize_t ch
   }
 }
 
+io::Mark MarkOf(bool rendered) { return rendered ? io::Mark::kRendered : io::Mark::kNone; }
+
 void WriteImage(const std::filesystem::path& file,
-                const py::array_t<std::uint8_t, py::array::c_style>& image) {
+                const py::array_t<std::uint8_t, py::array::c_style>& image, bool rendered) {
   RequireShape(image, 3, 3);
   const Grid<std::uint8_t> grid = GridFrom(image, 3);
   const Unlocked unlocked;
-  io::WritePng(file, grid);
+  WriteFileAtomically(file, io::EncodePng(grid, MarkOf(rendered)));
 }
 
 void WriteDepth(const std::filesystem::path& file,
-                const py::array_t<float, py::array::c_style>& depth) {
+                const py::array_t<float, py::array::c_style>& depth, bool rendered) {
   RequireShape(depth, 2, 1);
   const Grid<float> grid = GridFrom(depth, 1);
   const Unlocked unlocked;
-  io::WriteExr(file, grid, false);
+  io::WriteExr(file, grid, false, MarkOf(rendered));
 }
 
 py::bytes PngOf(const py::array_t<std::uint8_t, py::array::c_style>& image) {
@@ -117,10 +120,15 @@ void AddJobs(py::module_& module) {
   module.def("run", &Run, py::arg("words"), py::arg("options"), py::arg("progress") = py::none(),
              py::arg("note") = py::none(),
              "Run a command of `dtr`; returns (passed, the text that --json writes).");
-  module.def("write_image", &WriteImage, py::arg("file"), py::arg("image").noconvert(),
-             "Write an image, shape (height, width, 3), uint8 sRGB, as PNG.");
-  module.def("write_depth", &WriteDepth, py::arg("file"), py::arg("depth").noconvert(),
-             "Write a depth map, shape (height, width), float32, as EXR.");
+  module.def(
+      "write_image", &WriteImage, py::arg("file"), py::arg("image").noconvert(),
+      py::arg("rendered") = false,
+      "Write an image, shape (height, width, 3), uint8 sRGB, as PNG. rendered: its file says "
+      "that it is no photo, as those of `dtr render` do.");
+  module.def(
+      "write_depth", &WriteDepth, py::arg("file"), py::arg("depth").noconvert(),
+      py::arg("rendered") = false,
+      "Write a depth map, shape (height, width), float32, as EXR. rendered: as of an image.");
   module.def("png", &PngOf, py::arg("image").noconvert(),
              "The bytes of an image as PNG, at most 1024 pixels wide and high, for notebooks.");
 }

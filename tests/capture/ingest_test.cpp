@@ -94,8 +94,37 @@ TEST(IngestPhotos, NamesWhatItSkipsAndWhy) {
     EXPECT_THAT(skipped.reason, ::testing::Not(HasSubstr("\n")));
     EXPECT_THAT(skipped.reason, ::testing::Not(HasSubstr(folder.path().string())));
   }
-  EXPECT_THAT(names,
-              ElementsAre("b?.png", "cut.jpg", "empty.png", "loop", "out/workspace", "text.jpg"));
+  EXPECT_THAT(names, ElementsAre("b?.png", "cut.jpg", "empty.png", "loop", "text.jpg"));
+  EXPECT_THAT(LineOf(capture.contents),
+              HasSubstr("files of folders that dtr made (2: out/workspace/)"));
+}
+
+TEST(IngestPhotos, LinksToFoldersAreFollowedOnce) {
+  const TemporaryFolder folder;
+  fs::create_directories(folder / "elsewhere/deeper");
+  fs::create_directories(folder / "photos/own");
+  io::WriteImage(folder / "elsewhere/a.jpg", NoisePhoto(64, 48, 1));
+  io::WriteImage(folder / "elsewhere/deeper/b.jpg", NoisePhoto(64, 48, 2));
+  io::WriteImage(folder / "photos/own/c.jpg", NoisePhoto(64, 48, 3));
+  const auto link = [&](const fs::path& target, const std::string& name) {
+    fs::create_directory_symlink(folder / target, folder / "photos" / name);
+  };
+  link("elsewhere", "linked");
+  link("elsewhere", "twice");              // what "linked" leads to
+  link("elsewhere/deeper", "deeper");      // comes before "linked", which holds it
+  link("photos/own", "round");             // read as it stands
+  link("", "up");                          // holds all this
+  fs::create_directory_symlink(folder / "photos", folder / "elsewhere/back");
+  const Capture capture = Ingest(folder / "photos");
+  EXPECT_THAT(NamesOf(capture), ElementsAre("deeper/b.jpg", "linked/a.jpg", "own/c.jpg"));
+  std::vector<std::string> skipped;
+  for (const Skipped& item : capture.skipped) skipped.push_back(item.name + ": " + item.reason);
+  EXPECT_THAT(skipped,
+              ElementsAre("linked/back: links to a folder that holds this one",
+                          "linked/deeper: is read already, by a link to it",
+                          "round: links to a folder that is read already",
+                          "twice: links to a folder that is read already",
+                          "up: links to a folder that holds this one"));
 }
 
 TEST(IngestPhotos, FoldersWithoutPhotosAreCleanErrors) {

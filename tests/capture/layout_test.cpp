@@ -9,6 +9,7 @@
 
 #include "capture/folder_walk.h"
 #include "capture/ingest.h"
+#include "dtr/io/depth_io.h"
 #include "dtr/types/area_average.h"
 #include "tests/capture/photo_files.h"
 #include "tests/support/photo_kinds.h"
@@ -340,6 +341,43 @@ TEST_F(ProjectFolder, VideosOfLowResolutionAreNotAdvisedBesideThoseOfFull) {
   for (const char* extension : {".MTS", ".m2ts", ".insv", ".LRV", ".mj2"}) {
     EXPECT_TRUE(IsVideoExtension(extension)) << extension;
   }
+}
+
+TEST_F(ProjectFolder, WhatThisProgramMadeIsNoPhotoWhereverItLies) {
+  for (int i = 0; i < 3; ++i) WritePhoto("0" + std::to_string(i) + ".png", 10 + i);
+  const auto rendered = [&](const std::string& name) {
+    fs::create_directories((folder_ / name).parent_path());
+    io::WriteImage(folder_ / name, BlockPhoto(kWidth, kHeight, 99), 90, io::Mark::kRendered);
+  };
+  rendered("view.png");
+  rendered("out/plaza-0003.jpg");
+  rendered("out/comparison/0003.png");
+  io::WriteExr(folder_ / "view-depth.exr", Grid<float>(kWidth, kHeight), false,
+               io::Mark::kRendered);
+  io::WriteMask(folder_ / "view-seen.png", Mask(kWidth, kHeight, 1, 255), io::Mark::kRendered);
+  for (const char* mark : {"export/dtr-export.json", "set/set.json", "cap/capture.json"}) {
+    fs::create_directories((folder_ / mark).parent_path());
+    WriteFileAtomically(folder_ / mark, "{}");
+  }
+  WritePhoto("export/images/00.png", 20);
+  WritePhoto("set/views/00.png", 21);
+  WritePhoto("cap/images/00.png", 22);
+  WritePhoto("a.dtr.partial/work/frames/00.png", 23);
+  const Layout layout = Sort();
+  EXPECT_THAT(layout.photos, ElementsAre("00.png", "01.png", "02.png"));
+  EXPECT_THAT(layout.skipped, IsEmpty());
+  EXPECT_EQ(IgnoredOf(layout, "rendered_images"), 5);
+  EXPECT_EQ(IgnoredOf(layout, "own_folders"), 7);
+  EXPECT_THAT(LineOf(layout.contents), HasSubstr("images that dtr rendered (5: out/"));
+  EXPECT_THAT(LineOf(layout.contents),
+              HasSubstr("folders that dtr made (7: a.dtr.partial/, cap/, export/, set/)"));
+}
+
+TEST_F(ProjectFolder, RenderedImagesByThemselvesAreWhatIsAskedFor) {
+  for (const char* name : {"0.png", "1.jpg"}) {
+    io::WriteImage(folder_ / name, BlockPhoto(kWidth, kHeight, 3), 90, io::Mark::kRendered);
+  }
+  EXPECT_THAT(Sort().photos, ElementsAre("0.png", "1.jpg"));
 }
 
 TEST(IngestPhotos, ExtensionsOfHeifAndJpegAreKnownInAnyCase) {

@@ -174,6 +174,30 @@ TEST_F(SplitPanoramasTest, WhatStatesNothingIsAPanoramaOnlyWhereSaid) {
               HasSubstr("c.jpg is a 360 degree panorama, b.png is none"));
 }
 
+TEST_F(SplitPanoramasTest, AFewAmongOthersAreLeftOutAndNamed) {
+  fs::create_directories(folder_ / "in");
+  for (const char* name : {"a.jpg", "b.jpg", "c.jpg"}) {
+    io::WriteImage(folder_ / "in" / name, ImageRgb8(90, 60, 3, 128), 95);
+  }
+  WritePanorama("pano.jpg");
+  Capture one = Ingested();
+  EXPECT_FALSE(ArePanoramas(one, PanoramaUse::kAuto));
+  EXPECT_EQ(one.photos.size(), 3u);
+  EXPECT_EQ(one.contents.photos, 3);
+  ASSERT_EQ(one.skipped.size(), 1u);
+  EXPECT_EQ(one.skipped.front().name, "pano.jpg");
+  EXPECT_THAT(one.skipped.front().reason, HasSubstr("a 360 degree panorama among ordinary photos"));
+  WritePanorama("pano2.jpg");  // two of five: which are meant is not clear
+  Capture mixed = Ingested();
+  EXPECT_THAT(MessageOf<Error>([&] { (void)ArePanoramas(mixed, PanoramaUse::kAuto); }),
+              HasSubstr("give them in two folders"));
+  for (const char* name : {"p3.jpg", "p4.jpg", "p5.jpg", "p6.jpg", "p7.jpg"}) WritePanorama(name);
+  Capture many = Ingested();
+  EXPECT_TRUE(ArePanoramas(many, PanoramaUse::kAuto));
+  EXPECT_EQ(many.photos.size(), 7u);
+  EXPECT_EQ(many.skipped.size(), 3u);
+}
+
 TEST_F(SplitPanoramasTest, SizesThatAreNoPanoramasAreNamed) {
   Photo photo;
   photo.name = "p.jpg";

@@ -147,8 +147,8 @@ TEST_F(BadInput, OutputsThatExistOrCannotBeMade) {
   ExpectRejected(build_into(In("set.dtr/mine/set.dtr")), kFailed,
                  "cannot be made: Not a directory");
   ExpectRejected(build_into("/proc/set.dtr"), kFailed, "cannot be made: No such file or directory");
-  ExpectRejected(Dtr({"export", Shared("good.dtr"), "-o", In("set.dtr")}), kWrongUsage,
-                 "exists already; choose another name");
+  ExpectRejected(Dtr({"export", Shared("good.dtr"), "--format", "colmap", "-o", In("set.dtr")}),
+                 kWrongUsage, "exists already; choose another name");
   ExpectRejected(Dtr({"export", Shared("good.dtr"), "-o", In("absent/colmap")}), kWrongUsage,
                  "expected an existing folder to write into, found nothing");
   ExpectRejected(Dtr({"info", Shared("good.dtr"), "--json", In("absent/info.json")}), kWrongUsage,

@@ -100,7 +100,7 @@ TEST_F(Hostile, AnInterruptedBuildIsNotTakenForACapture) {
       {"capture", {"capture", photos}},
       {"dataset", {"dataset", "make", "plane"}},
       {"dataset", {"dataset", "convert", "fern", photos}},
-      {"export", {"export", Good().string()}}};
+      {"export", {"export", Good().string(), "--format", "colmap"}}};
   for (auto [kind, words] : others) {
     words.insert(words.end(), {"-o", In("set.dtr")});
     ExpectRejected(

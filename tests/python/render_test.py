@@ -18,8 +18,8 @@ class Rendering(WithSet):
         run_program("render", self.path, *words, "--force", "-o", self.folder / "frame.png", "--depth-out",
                     self.folder / "depth.exr", "--coverage-out", self.folder / "coverage.png")
         # Written from the arrays by the same writers: equal pixels are equal files.
-        dtr._core.write_image(self.folder / "ours.png", frame.image)
-        dtr._core.write_depth(self.folder / "ours.exr", frame.depth)
+        dtr._core.write_image(self.folder / "ours.png", frame.image, rendered=True)
+        dtr._core.write_depth(self.folder / "ours.exr", frame.depth, rendered=True)
         self.assertEqual((self.folder / "ours.png").read_bytes(), (self.folder / "frame.png").read_bytes())
         self.assertEqual((self.folder / "ours.exr").read_bytes(), (self.folder / "depth.exr").read_bytes())
         self.assertAlmostEqual(frame.coverage_share, (frame.coverage > 0).mean(), places=12)
@@ -61,7 +61,7 @@ class Rendering(WithSet):
         s = dtr.load(self.path)
         run_program("render", self.path, "--fly-through", 3, "--size", "48x0", "-o", self.folder / "path")
         for i, camera in enumerate(s.fly_through(3, size="48x0")):
-            dtr._core.write_image(self.folder / "ours.png", s.render(camera).image)
+            dtr._core.write_image(self.folder / "ours.png", s.render(camera).image, rendered=True)
             self.assertEqual((self.folder / "ours.png").read_bytes(),
                              (self.folder / "path" / f"{i:06}.png").read_bytes())
         cameras = s.cameras(self.courtyard / "cameras.json")

@@ -56,9 +56,9 @@ fs::path FileSaver::SaveImage(FrameMaker& maker) const {
   const MadeFrame& picture = maker.picture();
   const fs::path file = Free("image", {".png"});
   if (picture.shown != Shown::kColour || picture.options.fill_holes) {
-    io::WriteImage(file, maker.Image());
+    io::WriteImage(file, maker.Image(), io::kDefaultJpegQuality, io::Mark::kRendered);
   } else {
-    io::WriteImageWithAlpha(file, maker.Image(), maker.Result().coverage);
+    io::WriteImageWithAlpha(file, maker.Image(), maker.Result().coverage, io::Mark::kRendered);
   }
   return file;
 }
@@ -102,7 +102,7 @@ void SaveWindowAs(const fs::path& file, GLFWwindow* window) {
     const std::uint8_t* row = upside_down.row(image.height() - 1 - y);
     std::copy(row, row + row_bytes, image.row(y));
   }
-  io::WriteImage(file, image);
+  io::WriteImage(file, image, io::kDefaultJpegQuality, io::Mark::kRendered);
 }
 
 }  // namespace dtr::viewer

@@ -283,7 +283,7 @@ void DepthTR::saveProjectedImage(int vn, const std::string& file) const {
   const ProjectedView& projected = getProjectedDT(vn);
   dtr::Mask seen = projected.holes;
   for (std::uint8_t& value : seen.data()) value = value == 0 ? 255 : 0;
-  dtr::io::WriteImageWithAlpha(file, projected.projectedImage, seen);
+  dtr::io::WriteImageWithAlpha(file, projected.projectedImage, seen, dtr::io::Mark::kRendered);
 }
 
 }  // namespace osgDTR

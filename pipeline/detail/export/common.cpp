@@ -5,6 +5,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "capture/store.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/work_folder.h"
@@ -63,8 +64,15 @@ ExportReport ExportFolder(
   const fs::path output = WithoutTrailingSlash(request.output);
   WorkFolder work(WorkFolder::Of(output), "export");
   const ExportReport report = write(set, work.path());
+  MarkExport(set, format, work.path());
   work.Become(output);
   return report;
+}
+
+void MarkExport(const DtrSet& set, const char* format, const fs::path& folder) {
+  Json mark = {{"format", format}};
+  mark.update(SetFacts(set));
+  WriteJson(folder / capture::kExportFile, mark);
 }
 
 SurfaceViews::Options SurfaceOptions(const ExportRequest& request, bool colours) {

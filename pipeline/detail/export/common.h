@@ -29,6 +29,10 @@ ExportReport ExportFolder(
     const ExportRequest& request, const char* format, Progress& progress,
     const std::function<ExportReport(const DtrSet&, const std::filesystem::path&)>& write);
 
+/// Leaves capture::kExportFile in a folder of an export, by which a folder of photos around it
+/// tells its images from photos: `format` and SetFacts.
+void MarkExport(const DtrSet& set, const char* format, const std::filesystem::path& folder);
+
 /// How surfaces are read for a request: measured depth, with completed where it asks for it.
 SurfaceViews::Options SurfaceOptions(const ExportRequest& request, bool colours = false);
 

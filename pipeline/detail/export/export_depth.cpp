@@ -186,6 +186,7 @@ ExportReport ExportDepth(const ExportRequest& request, Progress& progress) {
   const fs::path output = WithoutTrailingSlash(request.output);
   WorkFolder work(WorkFolder::Of(output), "export");
   const ExportReport report = DepthExport(request, set, work.path()).Write(progress);
+  MarkExport(set, "depth", work.path());
   work.Become(output);
   return report;
 }

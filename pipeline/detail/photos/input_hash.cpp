@@ -29,7 +29,7 @@ std::string InputHash(const fs::path& input) {
   for (fs::recursive_directory_iterator entry(input), end; entry != end; ++entry) {
     if (entry->is_regular_file()) {
       files.push_back(entry->path());
-    } else if (entry->is_directory() && !capture::WhyNotSearched(entry->path()).empty()) {
+    } else if (entry->is_directory() && capture::IsOwnFolder(entry->path())) {
       entry.disable_recursion_pending();
     }
   }

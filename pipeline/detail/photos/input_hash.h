@@ -8,7 +8,7 @@
 namespace dtr::pipeline {
 
 /// SHA-256 (hex) of a file or of all names and files below a folder, but for folders of what we
-/// made ourselves (capture::WhyNotSearched): the output may lie there. "" for an empty path.
+/// made ourselves (capture::IsOwnFolder): the output may lie there. "" for an empty path.
 std::string InputHash(const std::filesystem::path& input);
 
 /// SHA-256 (hex) of these files and their names.

@@ -29,7 +29,8 @@ std::function<void(const View&, const RenderResult&)> ComparisonImages::Writer()
   if (!folder_) return {};
   return [this](const View& view, const RenderResult& rendered) {
     io::WriteImage(folder_->path() / ComparisonFileOf(view),
-                   eval::ComparisonImage(rendered.image, view.image, view.mask));
+                   eval::ComparisonImage(rendered.image, view.image, view.mask),
+                   io::kDefaultJpegQuality, io::Mark::kRendered);
   };
 }
 
