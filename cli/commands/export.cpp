@@ -13,6 +13,7 @@
 #include "cli/renderers.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/base/lower_case.h"
 #include "pipeline/export_web.h"
 
 namespace dtr::cli {
@@ -58,8 +59,44 @@ struct FormatOption {
   Names formats;
 };
 
+const Names kWebEndings = {".html", ".htm"};
+
+// The first format that writes files of this ending; empty: none.
+std::string FormatOfEnding(const std::string& ending) {
+  const auto has = [&](const Names& endings) {
+    return std::find(endings.begin(), endings.end(), ending) != endings.end();
+  };
+  for (const Format& format : Formats()) {
+    if (has(format.extensions)) return format.name;
+  }
+  return has(kWebEndings) ? "web" : "";
+}
+
+// Without --format the name's ending decides.
+std::string FormatFor(const std::filesystem::path& output) {
+  const std::string ending = LowerExtension(WithoutTrailingSlash(output));
+  if (ending.empty()) return "colmap";
+  const std::string format = FormatOfEnding(ending);
+  if (!format.empty()) return format;
+  throw UsageError(fmt::format(
+      "-o {}: no format writes files that end in '{}', found no --format either; end the name in "
+      ".ply, .las, .glb, .splat or .html, or give --format",
+      output.string(), ending));
+}
+
+// A folder called like a file would be taken for one.
+void RequireFolderName(const std::filesystem::path& output, const char* format) {
+  const std::string ending = LowerExtension(output);
+  const std::string of_files = FormatOfEnding(ending);
+  if (of_files.empty()) return;
+  throw UsageError(fmt::format(
+      "-o {}: --format {} writes a folder, and '{}' is the ending of a file, as --format {} "
+      "writes; choose another name or format",
+      output.string(), format, ending, of_files));
+}
+
 struct ExportOptions {
-  std::string format = "colmap";
+  std::string format;  ///< empty: by the name's ending
   Request request;
   pipeline::WebPageRequest web;
   bool evaluates_web = true;
@@ -89,7 +126,11 @@ std::string Summary(const Request& request, const Format& format,
 
 int RunFormat(Request request, const Format& format, const Context& context) {
   request.output = WithoutTrailingSlash(request.output);
-  if (!format.extensions.empty()) RequireOutputFile(request.output, "-o", format.extensions);
+  if (format.extensions.empty()) {
+    RequireFolderName(request.output, format.name);
+  } else {
+    RequireOutputFile(request.output, "-o", format.extensions);
+  }
   if (!std::filesystem::exists(request.output)) RequireFolderOf(request.output, "-o");
   request.threads = context.common.threads;
   request.force = context.common.force;
@@ -112,7 +153,7 @@ int RunWeb(pipeline::WebPageRequest request, const Context& context) {
   if (request.as_site) {
     RequireFolderOf(request.output, "-o");
   } else {
-    RequireOutputFile(request.output, "-o", {".html", ".htm"});
+    RequireOutputFile(request.output, "-o", kWebEndings);
   }
   request.force = context.common.force;
   const pipeline::WebPageReport report = pipeline::ExportWebPage(request, context.console);
@@ -136,6 +177,7 @@ int RunWeb(pipeline::WebPageRequest request, const Context& context) {
 }
 
 int RunExport(ExportOptions options, const Context& context) {
+  if (options.format.empty()) options.format = FormatFor(options.request.output);
   RequireOptionsOfFormat(options);
   if (options.format == "web") {
     options.web.set = options.request.set;
@@ -273,7 +315,8 @@ void AddExportCommand(CLI::App& app) {
         command
             .add_option("--format", options->format,
                         "What to write, see docs/EXPORT.md; web is one HTML file, or a folder for "
-                        "a web server, that shows the scene in a browser [colmap]")
+                        "a web server, that shows the scene in a browser [by the ending of -o: "
+                        ".ply ply, .las las, .glb mesh, .splat splat, .html web, none colmap]")
             ->check(CLI::IsMember(FormatNames()))
             ->type_name(fmt::format("{}", fmt::join(FormatNames(), "|")));
         options->of_formats.push_back(

@@ -96,5 +96,70 @@ TEST_F(ExportOfDepth, IsTheSameForAnyNumberOfThreadsAndIsImportedAgain) {
   }
 }
 
+TEST_F(ExportOfDepth, TheEndingOfTheNameDecidesAndAMismatchIsRejected) {
+  const std::string set = (folder_ / "set.dtr").string();
+  const auto name = [&](const char* file) { return (folder_ / file).string(); };
+  DtrOk({"export", set, "-o", name("x.ply")});
+  EXPECT_THAT(Text(name("x.ply")).substr(0, 3), "ply");
+  DtrOk({"export", set, "-o", name("X.GLB")});
+  EXPECT_THAT(Text(name("X.GLB")).substr(0, 4), "glTF");
+  DtrOk({"export", set, "-o", name("x.splat")});
+  EXPECT_TRUE(fs::is_regular_file(name("x.splat")));
+  DtrOk({"export", set, "-o", name("x.html"), "--no-evaluate"});
+  EXPECT_THAT(Text(name("x.html")), ::testing::HasSubstr("<!doctype html>"));
+  DtrOk({"export", set, "-o", name("model")});
+  EXPECT_TRUE(fs::exists(folder_ / "model/sparse/0/cameras.bin"));
+  EXPECT_EQ(nlohmann::json::parse(Text(name("model/dtr-export.json")))["format"], "colmap");
+  // With --format a folder may have a dot in its name, but not a file's ending.
+  DtrOk({"export", set, "-o", name("model.v2"), "--format", "colmap"});
+  ExpectRejected(Dtr({"export", set, "-o", name("y.ply"), "--format", "colmap"}), kWrongUsage,
+                 "--format colmap writes a folder, and '.ply' is the ending of a file");
+  ExpectRejected(Dtr({"export", set, "-o", name("y.html"), "--format", "nerfstudio"}), kWrongUsage,
+                 "--format nerfstudio writes a folder, and '.html' is the ending of a file");
+  ExpectRejected(Dtr({"export", set, "-o", name("y.las"), "--format", "ply"}), kWrongUsage,
+                 "expected a name ending in .ply");
+  ExpectRejected(Dtr({"export", set, "-o", name("y.obj")}), kWrongUsage,
+                 "no format writes files that end in '.obj'");
+  for (const char* file : {"y.ply", "y.html", "y.las", "y.obj"}) {
+    EXPECT_FALSE(fs::exists(name(file))) << file;
+  }
+}
+
+// A working folder: photos, and beside them what the program made of them.
+TEST(OwnOutputs, AFolderWithEverythingThatWasMadeInItIsItsPhotosAlone) {
+  const TemporaryFolder folder;
+  MakeSmallCourtyard(folder / "courtyard");
+  fs::create_directories(folder / "work");
+  for (const auto& photo : fs::directory_iterator(folder / "courtyard/images")) {
+    fs::copy_file(photo.path(), folder / "work" / photo.path().filename());
+  }
+  const auto name = [&](const char* file) { return (folder / "work" / file).string(); };
+  const auto photos_of = [&] {
+    DtrOk({"capture", name(""), "-o", (folder / "cap").string(), "--force", "--json",
+           (folder / "cap.json").string()});
+    return nlohmann::json::parse(Text(folder / "cap.json"))["contents"];
+  };
+  const auto before = photos_of();
+  const std::string set = name("scene.dtr");
+  ImportSmallCourtyard(folder / "courtyard", set);
+  DtrOk({"capture", name(""), "-o", name("captured")});
+  DtrOk({"export", set, "-o", name("model")});
+  DtrOk({"export", set, "--format", "nerfstudio", "-o", name("nerf")});
+  DtrOk({"export", set, "--format", "depth", "-o", name("depth_maps")});
+  DtrOk({"render", set, "--like", "0002", "-o", name("0002.png"), "--depth-out",
+         name("0002-depth.exr"), "--coverage-out", name("0002-seen.png")});
+  DtrOk({"render", set, "--like", "0003", "-o", name("view.jpg")});
+  DtrOk({"render", set, "--fly-through", "3", "-o", name("frames")});
+  DtrOk({"evaluate", set, "--leave-one-out", "--images", name("comparison")});
+  const auto after = photos_of();
+  EXPECT_EQ(after["photos"], before["photos"]);
+  EXPECT_EQ(after["cameras"], before["cameras"]);
+  EXPECT_EQ(after["masks"], 0);
+  const Ran again = DtrOk({"capture", name(""), "-o", (folder / "cap2").string()});
+  EXPECT_THAT(again.err, ::testing::HasSubstr("folders that dtr made ("));
+  EXPECT_THAT(again.err, ::testing::HasSubstr("captured/, depth_maps/, model/, nerf/"));
+  EXPECT_THAT(again.err, ::testing::HasSubstr("images that dtr rendered ("));
+}
+
 }  // namespace
 }  // namespace dtr::testing
