@@ -82,7 +82,7 @@ std::string Nearest(const std::string& typed, const std::vector<std::string>& ca
 
 std::string DidYouMean(const std::string& typed, const std::vector<std::string>& candidates) {
   const std::string meant = Nearest(typed, candidates);
-  return meant.empty() ? "" : fmt::format("; did you mean '{}'?", meant);
+  return meant.empty() ? "" : fmt::format(" (did you mean '{}'?)", meant);
 }
 
 std::vector<std::string> CommandNames(const CLI::App& app) {
@@ -104,7 +104,11 @@ std::vector<std::string> WithHelpAsOption(std::vector<std::string> words) {
 std::string UnknownCommand(const CLI::App& app, const std::vector<std::string>& words) {
   const auto [command, count] = Called(app, words);
   const std::vector<std::string> names = CommandNames(*command);
-  if (names.empty() || count == words.size() || words[count].starts_with('-')) return "";
+  // What takes words of its own, as `batch` does those of a build, may be given any.
+  if (names.empty() || command->get_allow_extras() || count == words.size() ||
+      words[count].starts_with('-')) {
+    return "";
+  }
   const std::string called = fmt::format(
       "{}", fmt::join(words.begin(), words.begin() + static_cast<long>(count) + 1, " "));
   return fmt::format("no command is called '{}'{}", called, DidYouMean(words[count], names));
@@ -120,7 +124,7 @@ std::string MeantOption(const CLI::App& app, const std::vector<std::string>& wor
       continue;
     }
     const std::string meant = Nearest(name, names);
-    return meant.empty() ? "" : fmt::format("; {}: did you mean {}?", name, meant);
+    return meant.empty() ? "" : fmt::format(" ({}: did you mean {}?)", name, meant);
   }
   return "";
 }

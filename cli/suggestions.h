@@ -11,7 +11,7 @@ namespace dtr::cli {
 /// none is near, or two are equally near.
 std::string Nearest(const std::string& typed, const std::vector<std::string>& candidates);
 
-/// "; did you mean 'build'?", empty where Nearest is.
+/// " (did you mean 'build'?)", empty where Nearest is.
 std::string DidYouMean(const std::string& typed, const std::vector<std::string>& candidates);
 
 /// The names of an app's visible commands.
@@ -24,7 +24,7 @@ std::vector<std::string> WithHelpAsOption(std::vector<std::string> words);
 /// has commands; empty where all exist.
 std::string UnknownCommand(const CLI::App& app, const std::vector<std::string>& words);
 
-/// "; --holdot: did you mean --holdout?" for the first option among the words that the command that
+/// " (--holdot: did you mean --holdout?)" for the first option among the words that the command that
 /// they call does not have; empty where it has all, or none is near.
 std::string MeantOption(const CLI::App& app, const std::vector<std::string>& words);
 

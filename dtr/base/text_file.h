@@ -11,7 +11,7 @@ namespace dtr {
 
 /// The text that `bytes` are, in the one form that our readers know: UTF-8 without a byte order
 /// mark, each line ended by '\n', the last one too. Converts UTF-16 that has a byte order mark, and
-/// line ends "\r\n" and '\r'. Throws Error "source: ..." where a byte is 0 (no text has one, UTF-16
+/// the line ends of Windows and old Macs. Throws Error "source: ..." where a byte is 0 (no text has one, UTF-16
 /// without its mark has many) and where UTF-16 is cut or broken.
 std::string TextOf(std::string bytes, const std::string& source);
 

@@ -196,8 +196,8 @@ void DepthPriors::Validate(LengthUnit unit, Progress& progress) {
         "give maps of these photos, or leave it out",
         where, found.points, stereo::kMinPriorPointsInAll));
   }
-  const bool unit_known = unit == LengthUnit::kMetre;  // else any ratio may be right
-  const Unit* suspected = unit_known ? SuspectedUnit(found.scale) : nullptr;
+  const bool unit_known = unit == LengthUnit::kMetre;
+  const Unit* suspected = unit == LengthUnit::kArbitrary ? nullptr : SuspectedUnit(found.scale);
   if (suspected != nullptr ||
       (unit_known && std::abs(std::log(found.scale)) > std::log(kMaxScale))) {
     throw Error(fmt::format(
