@@ -95,7 +95,7 @@ TEST(Advise, SkyIsNotWhatACameraCouldMend) {
   for (const Place& place : AdviseOn(views).places) {
     if (place.where.starts_with("beyond")) continue;
     EXPECT_NEAR(place.depthless_share, 0.5, 0.03) << place.where;
-    EXPECT_LT(place.unseen_share, 0.02);
+    EXPECT_LT(place.unseen_share, 0.03);  // by the cameras that stay
     EXPECT_FALSE(place.poor);
   }
 }

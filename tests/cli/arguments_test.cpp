@@ -14,6 +14,40 @@ namespace fs = std::filesystem;
 
 class Arguments : public CourtyardAndSet {};
 
+TEST_F(Arguments, MistypedWordsAreAnsweredByWhatWasMeant) {
+  const auto rejected = [](const std::vector<std::string>& words, const std::string& line) {
+    ExpectRejected(Dtr(words), kWrongUsage, line);
+  };
+  rejected({"biuld", Photos()}, "no command is called 'biuld' (did you mean 'build'?)");
+  rejected({"calibrate", "bord", Photos()},
+           "no command is called 'calibrate bord' (did you mean 'board'?)");
+  // Left out, put in, exchanged, swapped; the beginning of one name; an underscore.
+  for (const std::string typed :
+       {"--holdouts", "--holbout", "--hodlout", "--holdo", "--holdout_strict"}) {
+    const Ran ran = Dtr({"build", Photos(), "-o", In("s.dtr"), typed, "every:8"});
+    EXPECT_EQ(ran.code, kWrongUsage);
+    EXPECT_NE(ran.err.find(typed + ": did you mean --holdout"), std::string::npos) << ran.err;
+  }
+  rejected({"build", Photos(), "-o", In("s.dtr"), "--holdot", "every:8"},
+           "(--holdot: did you mean --holdout?)");
+  // What is missing is missing for the same reason.
+  rejected({"build", Photos(), "--ouput", In("s.dtr")},
+           "--output is required (--ouput: did you mean --output?)");
+  const Ran far = Dtr({"build", Photos(), "-o", In("s.dtr"), "--frobnicate"});
+  EXPECT_EQ(far.code, kWrongUsage);
+  EXPECT_EQ(far.err.find("did you mean"), std::string::npos) << far.err;
+}
+
+TEST_F(Arguments, HelpOfACommandIsThatOfItsOption) {
+  EXPECT_EQ(DtrOk({"help"}).out, DtrOk({"--help"}).out);
+  EXPECT_EQ(DtrOk({"help", "build"}).out, DtrOk({"build", "--help"}).out);
+  const std::string board = DtrOk({"help", "calibrate", "board"}).out;
+  EXPECT_EQ(board, DtrOk({"calibrate", "board", "--help"}).out);
+  EXPECT_NE(board.find("--board"), std::string::npos);
+  EXPECT_NE(DtrOk({"--help"}).out.find("help"), std::string::npos);
+  ExpectRejected(Dtr({"help", "frobnicate"}), kWrongUsage, "no command is called 'frobnicate'");
+}
+
 TEST_F(Arguments, NumbersThatAreNone) {
   const std::string words = ": expected a finite number, found ";
   for (const char* word : {"nan", "-nan", "inf", "1e999", "4GB"}) {

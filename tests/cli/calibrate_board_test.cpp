@@ -32,7 +32,7 @@ TEST_F(CalibrateBoard, TheChessboardSetGivesOneCameraInThreeFormats) {
   const Ran ran =
       Board(Photos(), {"--images", "left*.jpg", "--board", kChessboard, "-o", In("left.json"), "-o",
                        In("left.yml"), "-o", In("left.txt"), "--json", "-"});
-  ASSERT_EQ(ran.code, 0) << ran.err;
+  ASSERT_TRUE(IsDone(ran)) << ran.err;
   const Json json = Json::parse(ran.out);
   for (const char* name : {"board", "cameras", "views", "models", "left_out"}) {
     EXPECT_TRUE(json.contains(name)) << name;
@@ -64,13 +64,31 @@ TEST_F(CalibrateBoard, TheBytesDoNotDependOnThreads) {
   for (const char* threads : {"1", "3"}) {
     const Ran ran = Board(Photos(), {"--images", "right0*.jpg", "--board", kChessboard, "-o",
                                      In(threads) + ".json", "--threads", threads});
-    ASSERT_EQ(ran.code, 0) << ran.err;
+    ASSERT_TRUE(IsDone(ran)) << ran.err;
   }
   std::string one = Text(In("1.json")), three = Text(In("3.json"));
   const size_t name = one.find("\"name\": \"1\"");  // the file's name is the camera's
   ASSERT_NE(name, std::string::npos);
   one[name + 9] = '3';
   EXPECT_EQ(one, three);
+}
+
+TEST_F(CalibrateBoard, TheTestsOfValidateEndItAndTheFilesAreThere) {
+  DTR_REQUIRE_DATA(Photos());
+  const Ran few = Board(Photos(), {"--images", "left0[1-5].jpg", "--board", kChessboard, "--model",
+                                   "brown4", "-o", In("few.json"), "--json", "-"});
+  EXPECT_EQ(few.code, kFailed) << few.err;
+  EXPECT_TRUE(few.ErrorLines().empty()) << few.err;
+  EXPECT_EQ(calib::ReadCalibration(In("few.json")).views.size(), 5u);
+  const Json validation = Json::parse(few.out)["validation"];
+  EXPECT_EQ(validation["passed"], false);
+  EXPECT_EQ(validation["result"], "FAILED");
+  const std::string conclusion = validation["conclusion"];
+  EXPECT_THAT(conclusion, HasSubstr("min_views 5 (at least 8)"));
+  EXPECT_TRUE(few.err.ends_with(conclusion + "\n")) << few.err;
+  const Ran validated = Dtr({"validate", In("few.json"), "--json", "-"});
+  EXPECT_EQ(validated.code, kFailed);
+  EXPECT_EQ(Json::parse(validated.out)["conclusion"], conclusion);
 }
 
 TEST_F(CalibrateBoard, WhatCannotWorkIsSaidInOneLine) {

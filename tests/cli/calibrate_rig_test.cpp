@@ -28,7 +28,7 @@ class CalibrateRig : public ChessboardSet {
     static const Json json = [] {
       const TemporaryFolder folder;
       const std::string file = (folder / "rig.json").string();
-      DtrOk({"calibrate", "rig", Photos().string(), "--board", kChessboard, "--model", "brown4",
+      DtrCalibrated({"calibrate", "rig", Photos().string(), "--board", kChessboard, "--model", "brown4",
              "-o", file, "-o", (folder / "rig.yml").string()});
       Json both;
       both["json"] = Json::parse(Text(file));

@@ -41,8 +41,8 @@ class RotatedPhotos : public ChessboardSet {
   }
   Json Calibrate(const std::string& folder, std::string* notes = nullptr) {
     const Ran ran =
-        DtrOk({"calibrate", "board", In(folder), "--board", kChessboard, "--model", "brown4", "-o",
-               In(folder + "_out/camera.json"), "--json", "-", "--force"});
+        DtrCalibrated({"calibrate", "board", In(folder), "--board", kChessboard, "--model",
+                       "brown4", "-o", In(folder + "_out/camera.json"), "--json", "-", "--force"});
     if (notes) *notes = ran.err;
     return Json::parse(ran.out);
   }
@@ -219,8 +219,8 @@ std::vector<std::string> PhotosIn(const std::string& page) {
 
 TEST_F(RotatedPhotos, ValidateReadsAndDrawsThemAsTheUnrotated) {
   DTR_REQUIRE_DATA(Photos());
-  DtrOk({"calibrate", "board", Photos().string(), "--images", "left0*.jpg", "--board", kChessboard,
-         "--model", "brown4", "-o", In("left.json")});
+  DtrCalibrated({"calibrate", "board", Photos().string(), "--images", "left0*.jpg", "--board",
+                 kChessboard, "--model", "brown4", "-o", In("left.json")});
   Write("plain", "left", [](int) { return 1; });
   Write("rotated", "left", [](int) { return kClockwise; });  // all: the camera says which way
   std::map<std::string, Json> json;
@@ -253,8 +253,8 @@ TEST_F(RotatedPhotos, ARigPutsBackEachCamerasOwn) {
     const bool rotate = folder == "rotated";
     Write(folder, "left", [&](int i) { return rotate && i <= 4 ? kClockwise : 1; });
     Write(folder, "right", [&](int i) { return rotate && i > 8 ? kCounterclockwise : 1; });
-    const Ran ran = DtrOk({"calibrate", "rig", In(folder), "--board", kChessboard, "--model",
-                           "brown4", "-o", In(folder + ".json"), "--json", "-"});
+    const Ran ran = DtrCalibrated({"calibrate", "rig", In(folder), "--board", kChessboard,
+                                   "--model", "brown4", "-o", In(folder + ".json"), "--json", "-"});
     EXPECT_EQ(Json::parse(ran.out)["rotated_photos"]["clockwise"], rotate ? 4 : 0);
     EXPECT_EQ(Json::parse(ran.out)["rotated_photos"]["counterclockwise"], rotate ? 6 : 0);
     if (rotate) {

@@ -92,6 +92,19 @@ Ran DtrOk(const std::vector<std::string>& args) {
   return ran;
 }
 
+bool IsDone(const Ran& ran) {
+  const std::string all = ran.out + ran.err;
+  return ran.code == 0 ||
+         (ran.code == kFailed && all.find("validation FAILED: ") != std::string::npos);
+}
+
+Ran DtrCalibrated(const std::vector<std::string>& args) {
+  Ran ran = Dtr(args);
+  EXPECT_EQ(ran.signal, 0) << ran.err;
+  EXPECT_TRUE(IsDone(ran)) << ran.err;
+  return ran;
+}
+
 void ExpectRejected(const Ran& ran, int code, const std::string& text) {
   EXPECT_EQ(ran.signal, 0) << ran.err;
   EXPECT_EQ(ran.code, code) << ran.err;

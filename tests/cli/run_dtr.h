@@ -39,6 +39,12 @@ Ran DtrByItself(const std::vector<std::string>& args, const Interruption& interr
 /// Runs it and expects exit code 0.
 Ran DtrOk(const std::vector<std::string>& args);
 
+/// Whether a run did its work, though the calibration that it made or looked at may fail its tests.
+bool IsDone(const Ran& ran);
+
+/// Runs `calibrate board` or `rig`, and expects that it did its work.
+Ran DtrCalibrated(const std::vector<std::string>& args);
+
 /// Expects a rejection: this exit code, one line that begins with "dtr: ", the last one on stderr,
 /// with `text` in it. docs/ERRORS.md must list the text, so that the page stays true.
 void ExpectRejected(const Ran& ran, int code, const std::string& text);

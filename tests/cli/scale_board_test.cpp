@@ -123,7 +123,7 @@ TEST_F(ScaleByBoard, BoardsThatTellNothingAreRejected) {
                  "scale by a board: expected views that agree where the board lies, found that");
   ExpectRejected(
       Scale("moving.dtr", "charuco:5x6:30mm:0.7"), kWrongUsage,
-      "6 of 6 photos looked at show a chessboard of 7x5 inner corners, none the given one; "
+      "3 of 3 photos looked at show a chessboard of 7x5 inner corners, none the given one; "
       "give chessboard:7x5:SQUARE");
   MakeSet("two.dtr", {}, 2);
   ExpectRejected(Scale("two.dtr", kBoardText), kFailed,

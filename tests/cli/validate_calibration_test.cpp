@@ -20,7 +20,7 @@ class ValidateCalibration : public ChessboardSet {
  protected:
   // The left camera by its first nine photos; 10 to 14 are unseen.
   void Calibrate() {
-    DtrOk({"calibrate", "board", Photos().string(), "--images", "left0*.jpg", "--board",
+    DtrCalibrated({"calibrate", "board", Photos().string(), "--images", "left0*.jpg", "--board",
            kChessboard, "--model", "brown4", "-o", In("left.json"), "-o", In("left.yml"), "-o",
            In("left.txt")});
   }

@@ -48,8 +48,16 @@ TEST_F(ValidateReport, ThePageShowsTestsViewsMapsAndTheWorstPhotos) {
   }
   // Residuals, two maps, and four photos.
   EXPECT_EQ(Times(page, "data:image/svg+xml"), 7u);
-  EXPECT_THAT(page, HasSubstr(json["passed"] ? "The calibration passed its tests"
-                                             : "The calibration broke at least one test"));
+  // The terminal, the page and the JSON end with the same words.
+  const std::string conclusion = json["conclusion"];
+  EXPECT_TRUE(ran.err.ends_with(conclusion + "\n")) << ran.err;
+  EXPECT_THAT(page, HasSubstr(json["passed"] ? "validation passed" : "validation FAILED"));
+  EXPECT_EQ(json["result"], json["passed"] ? "passed" : "FAILED");
+  for (const auto& test : json["tests"]) {
+    const std::string word = test["passed"] ? "passed " : "FAILED ";
+    EXPECT_THAT(ran.err, HasSubstr(word + test["name"].get<std::string>() + ": "));
+  }
+  EXPECT_THAT(page, Not(HasSubstr("BROKEN")));
   // It needs no network, and the set is only read.
   EXPECT_THAT(page, Not(HasSubstr("src=\"http")));
   EXPECT_TRUE(DifferingFiles(before, Contents(folder_ / "set.dtr")).empty());

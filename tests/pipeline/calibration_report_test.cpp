@@ -128,6 +128,7 @@ TEST(CalibrationReport, FieldsKeepTheirNamesAndOrder) {
                           .images_per_model = {8, 2},
                           .lack_of_parallax = {},
                           .forward_motion = true,
+                          .doubt = {},
                           .feature_image_size_px = 3200,
                           .lens_model = "RADIAL"};
   report.rig.emplace();

@@ -34,7 +34,7 @@ using ::testing::IsEmpty;
 constexpr double kW = TrueCapture::kWidth, kH = TrueCapture::kHeight, kFocal = 500;
 constexpr double kSamePx = 1e-6;  // files have full doubles
 // Formulas of distortion that differ by less say the same: which is meant no feature shows.
-constexpr double kFormulasPx = 0.05;
+constexpr double kFormulasPx = 0.1;
 
 // Pixel from the corner, y down, of a point in the camera.
 using Project = std::function<Vector2d(const Vector3d&)>;

@@ -211,7 +211,7 @@ TEST(SetReport, ShowsViewsSkippedPhotosChecksAndTimes) {
   info.checks = {{"held_out_rms_px", std::nan(""), 1.5, false, "nothing measured"}};
   const std::string html = SetReport(set, info);
   for (const char* text : {"a&lt;b&gt;.jpg", "held out", "notes.jpg", "no image", "12.3 s",
-                           "13.3 s", "held_out_rms_px", "BROKEN", "2.1 %", "1 to 64", "sgbm"}) {
+                           "13.3 s", "held_out_rms_px", "FAILED", "2.1 %", "1 to 64", "sgbm"}) {
     EXPECT_THAT(html, HasSubstr(text));
   }
   EXPECT_THAT(html, Not(HasSubstr("Uncertainty")));
