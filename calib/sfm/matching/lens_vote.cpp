@@ -9,7 +9,7 @@
 #include <map>
 #include <span>
 
-#include "calib/sfm/matching/lens_pair.h"
+#include "calib/sfm/matching/pair_normal.h"
 #include "dtr/base/parallel_for.h"
 
 namespace dtr::sfm::matching {
@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kK1s[] = {-0.3, -0.18, -0.08, 0, 0.1};
 constexpr double kFisheyeK1s[] = {-0.12, -0.06, 0, 0.06};  // of the angle
-constexpr double kFarthestOffAxis = 1.4;  // rad; farther off, the plane z = 1 magnifies 30 times
+constexpr double kFarthestOffAxis = 1.4;   // rad; farther off, the plane z = 1 magnifies 30 times
 constexpr double kCentreDeviation = 0.01;  // long sides, of the prior
 constexpr int kSteps = 25, kReposings = 3;
 
@@ -39,67 +39,23 @@ std::vector<VoteLens> Grid(const VoteOptions& options) {
 // for the last, but where it stays in the middle, what it is off goes into the focal length.
 constexpr int kOfLens = 4;
 enum LensUnknown { kLogFocal, kRadial, kCentreX, kCentreY };
-using LensMatrix = Eigen::Matrix<double, kOfLens, kOfLens>;
-using LensVector = Eigen::Matrix<double, kOfLens, 1>;
-
-// Normal equations of a pair: pose and lens.
-struct Normal {
-  Eigen::Matrix<double, 5 + kOfLens, 5 + kOfLens> h =
-      Eigen::Matrix<double, 5 + kOfLens, 5 + kOfLens>::Zero();
-  Eigen::Matrix<double, 5 + kOfLens, 1> g = Eigen::Matrix<double, 5 + kOfLens, 1>::Zero();
-  double weights = 0, squares = 0;
-};
-
-// Of the lens alone, the pose eliminated.
-struct Reduced {
-  LensMatrix h = LensMatrix::Zero();
-  LensVector g = LensVector::Zero();
-};
-
-Reduced ReducedOf(const Normal& n) {
-  const auto pose = n.h.topLeftCorner<5, 5>().ldlt();
-  const Eigen::Matrix<double, 5, kOfLens> across = n.h.topRightCorner<5, kOfLens>();
-  return {n.h.bottomRightCorner<kOfLens, kOfLens>() - across.transpose() * pose.solve(across),
-          n.g.tail<kOfLens>() - across.transpose() * pose.solve(n.g.head<5>())};
-}
+using Normal = PairNormal<kOfLens>;
+using Reduced = Normal::Reduced;
+using LensMatrix = Normal::Matrix;
+using LensVector = Normal::Vector;
 
 VoteLens Stepped(const VoteLens& lens, const LensVector& step) {
   return {lens.focal * std::exp(step[kLogFocal]), lens.k1 + step[kRadial], lens.fisheye,
           lens.centre + step.tail<2>()};
 }
 
-Normal NormalOf(const VotePair& pair, const VoteLens& lens, const RelativePose& pose) {
-  constexpr double kStep = 1e-5;
-  Normal normal;
-  const PoseDerivatives at(pose);
-  std::array<VoteLens, kOfLens> nearby;
-  for (int k = 0; k < kOfLens; ++k) nearby[k] = Stepped(lens, kStep * LensVector::Unit(k));
-  const auto residual = [&](const VoteLens& by, size_t i, PoseRow* row, double& scale) {
-    double ma = 1, mb = 1;
-    const auto a = Unbent(by, pair.points.a[i], &ma), b = Unbent(by, pair.points.b[i], &mb);
-    if (!a || !b) return std::numeric_limits<double>::quiet_NaN();
-    scale = kScale * std::sqrt(ma * mb);
-    return at.Residual(*a, *b, row) / scale;
-  };
-  for (size_t i = 0; i < pair.points.size(); ++i) {
-    PoseRow pose_row;
-    double scale = 1, other = 1;
-    const double r = residual(lens, i, &pose_row, scale);
-    if (!std::isfinite(r)) continue;
-    const double root = 1 / (1 + r * r), weight = root * root;
-    if (weight < 1e-3) continue;
-    Eigen::Matrix<double, 5 + kOfLens, 1> row;
-    row.head<5>() = pose_row.transpose() / scale;
-    for (int k = 0; k < kOfLens; ++k) {
-      const double moved = residual(nearby[k], i, nullptr, other);
-      row[5 + k] = std::isfinite(moved) ? (moved - r) / kStep : 0;
-    }
-    normal.h.noalias() += weight * row * row.transpose();
-    normal.g += weight * r * row;
-    normal.weights += weight;
-    normal.squares += weight * r * r;
+Normal NormalOfLens(const VotePair& pair, const VoteLens& lens, const RelativePose& pose) {
+  std::array<LensPair, kOfLens> nearby;
+  for (int k = 0; k < kOfLens; ++k) {
+    const VoteLens stepped = Stepped(lens, kLensStep * LensVector::Unit(k));
+    nearby[static_cast<size_t>(k)] = {stepped, stepped};
   }
-  return normal;
+  return NormalOf<kOfLens>(pair, {lens, lens}, nearby, pose);
 }
 
 // Lens and poses together.
@@ -112,17 +68,7 @@ class Joint {
   }
 
   VoteResult Solve() {
-    double damping = 1e-3;
-    for (int k = 0; k < kSteps && damping < 1e6; ++k) {
-      if (options_.progress != nullptr) options_.progress->ThrowIfInterrupted();
-      const double before = cost_;
-      if (!Step(damping)) {
-        damping *= 10;
-        continue;
-      }
-      damping *= 0.2;
-      if (before - cost_ < 1e-7 * before) break;
-    }
+    Minimise(kSteps, options_.progress, cost_, [&](double damping) { return Step(damping); });
     VoteResult result;
     result.lens = lens_;
     result.cost = DataCost(lens_, poses_);
@@ -181,12 +127,11 @@ class Joint {
     normals.resize(pairs_.size());
     ParallelFor(0, static_cast<int>(pairs_.size()), options_.threads, [&](int i) {
       const auto p = static_cast<size_t>(i);
-      normals[p] = NormalOf(pairs_[p], lens_, poses_[p]);
+      normals[p] = NormalOfLens(pairs_[p], lens_, poses_[p]);
     });
     for (Normal& n : normals) {
-      n.h.diagonal().head<5>() *= 1 + damping;
-      n.h.diagonal().head<5>().array() += 1e-9;
-      add(ReducedOf(n));
+      n.DampPose(damping);
+      add(n.WithoutPose());
     }
     FixUnasked(h, g);
     h.diagonal() *= 1 + damping;
@@ -215,12 +160,7 @@ class Joint {
     const VoteLens lens = Stepped(lens_, step);
     std::vector<RelativePose> poses;
     for (size_t p = 0; p < pairs_.size(); ++p) {
-      const Normal& n = normals[p];
-      const Eigen::Matrix<double, 5, 1> right =
-          n.g.head<5>() + n.h.topRightCorner<5, kOfLens>() * step;
-      Eigen::Matrix<double, 5, 1> move = -n.h.topLeftCorner<5, 5>().ldlt().solve(right);
-      if (!move.allFinite()) move.setZero();
-      poses.push_back(PoseDerivatives(poses_[p]).Moved(move));
+      poses.push_back(PoseDerivatives(poses_[p]).Moved(normals[p].PoseStep(step)));
     }
     const double cost = Cost(lens, poses);
     if (!(cost < cost_)) return false;
@@ -235,13 +175,9 @@ class Joint {
     LensVector g;
     std::vector<Normal> normals;
     Reduce(0, h, g, normals);
-    double weights = 0, squares = 0;
-    for (const Normal& n : normals) {
-      weights += n.weights;
-      squares += n.squares;
-    }
-    if (!(weights > 0)) return std::numeric_limits<double>::infinity();
-    const double by_matches = h.inverse()(0, 0) * squares / weights;
+    const double noise = NoiseVariance(normals);
+    if (!std::isfinite(noise)) return noise;
+    const double by_matches = h.inverse()(0, 0) * noise;
     return std::sqrt(std::max({0.0, by_matches, VarianceByPhotos(h, normals)}));
   }
 
@@ -251,7 +187,7 @@ class Joint {
   double VarianceByPhotos(const LensMatrix& h, const std::vector<Normal>& normals) const {
     std::map<int, Reduced> of_photo;
     for (size_t p = 0; p < pairs_.size(); ++p) {
-      const Reduced reduced = ReducedOf(normals[p]);
+      const Reduced reduced = normals[p].WithoutPose();
       for (const int photo : {pairs_[p].photo_a, pairs_[p].photo_b}) {
         of_photo[photo].h += reduced.h;
         of_photo[photo].g += reduced.g;

@@ -24,7 +24,7 @@ constexpr size_t kCandidates = 80;     // pairs whose fundamental matrix is look
 constexpr size_t kVotingMatches = 80;  // of a pair
 constexpr size_t kFewestInliers = 30;  // of a pair that votes: more than chance gives
 constexpr size_t kVotersOfPhoto = 4;   // at least, where every photo has a focal length of its own
-constexpr size_t kMinZoomed = 3;  // photos; of two, nothing tells whose focal length is another
+constexpr size_t kMinZoomed = 3;       // photos; of two, either may be the zoomed one
 constexpr double kSureDeviation = 0.1, kContradiction = 1.15, kClearlyLower = 0.9;
 constexpr double kContradictionSigmas = 3;
 // What the matches of a set have wrong in common (a lens that k1 alone does not describe, features
@@ -156,7 +156,7 @@ struct Voters {
   bool on_focal = false;  // else they can vote on distortion alone
 };
 
-// The candidates of these pairs, those that tell the most first; none that tells nothing.
+// The candidates of these pairs, those with the largest weight first; none without.
 std::vector<Candidate> CandidatesOf(const std::vector<const CoarsePair*>& pairs,
                                     std::span<const MatchPhoto> photos,
                                     std::span<const calib::LensCamera> cameras,

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "calib/sfm/matching/lens_pair.h"
+#include "calib/sfm/matching/pair_normal.h"
 #include "dtr/base/parallel_for.h"
 
 namespace dtr::sfm::matching {
@@ -113,46 +113,16 @@ std::vector<std::pair<size_t, Labels>> Starts(const ZoomGraph& graph, const Grid
   return starts;
 }
 
-// Normal equations of a pair: pose, both focal lengths, k1.
-struct PairNormal {
-  Eigen::Matrix<double, 8, 8> h = Eigen::Matrix<double, 8, 8>::Zero();
-  Eigen::Matrix<double, 8, 1> g = Eigen::Matrix<double, 8, 1>::Zero();
-  double weights = 0, squares = 0;
-};
+// Unknowns of a pair's lenses: both focal lengths, k1.
+constexpr int kOfLenses = 3;
+using Normal = PairNormal<kOfLenses>;
 
-PairNormal NormalOf(const VotePair& pair, const LensPair& at, const RelativePose& pose) {
-  constexpr double kStep = 1e-5;
-  PairNormal normal;
-  const PoseDerivatives derivatives(pose);
-  const LensPair nearby[3] = {{Stepped(at.a, kStep, 0), at.b},
-                              {at.a, Stepped(at.b, kStep, 0)},
-                              {Stepped(at.a, 0, kStep), Stepped(at.b, 0, kStep)}};
-  const auto residual = [&](const LensPair& by, size_t i, PoseRow* row, double& scale) {
-    double ma = 1, mb = 1;
-    const auto a = Unbent(by.a, pair.points.a[i], &ma), b = Unbent(by.b, pair.points.b[i], &mb);
-    if (!a || !b) return std::numeric_limits<double>::quiet_NaN();
-    scale = kScale * std::sqrt(ma * mb);
-    return derivatives.Residual(*a, *b, row) / scale;
-  };
-  for (size_t i = 0; i < pair.points.size(); ++i) {
-    PoseRow pose_row;
-    double scale = 1, other = 1;
-    const double r = residual(at, i, &pose_row, scale);
-    if (!std::isfinite(r)) continue;
-    const double root = 1 / (1 + r * r), weight = root * root;
-    if (weight < 1e-3) continue;
-    Eigen::Matrix<double, 8, 1> row;
-    row.head<5>() = pose_row.transpose() / scale;
-    for (int k = 0; k < 3; ++k) {
-      const double moved = residual(nearby[k], i, nullptr, other);
-      row[5 + k] = std::isfinite(moved) ? (moved - r) / kStep : 0;
-    }
-    normal.h.noalias() += weight * row * row.transpose();
-    normal.g += weight * r * row;
-    normal.weights += weight;
-    normal.squares += weight * r * r;
-  }
-  return normal;
+Normal NormalOfZoom(const VotePair& pair, const LensPair& at, const RelativePose& pose) {
+  return NormalOf<kOfLenses>(pair, at,
+                             {{{Stepped(at.a, kLensStep, 0), at.b},
+                               {at.a, Stepped(at.b, kLensStep, 0)},
+                               {Stepped(at.a, 0, kLensStep), Stepped(at.b, 0, kLensStep)}}},
+                             pose);
 }
 
 // All focal lengths, k1 and poses together; the last unknowns are k1 and the common focal length.
@@ -174,17 +144,7 @@ class ZoomSolve {
   double cost() const { return cost_; }  // with what priors cost
 
   ZoomResult Solve() {
-    double damping = 1e-3;
-    for (int k = 0; k < kZoomSteps && damping < 1e6; ++k) {
-      if (options_.progress != nullptr) options_.progress->ThrowIfInterrupted();
-      const double before = cost_;
-      if (!Step(damping)) {
-        damping *= 10;
-        continue;
-      }
-      damping *= 0.2;
-      if (before - cost_ < 1e-7 * before) break;
-    }
+    Minimise(kZoomSteps, options_.progress, cost_, [&](double damping) { return Step(damping); });
     ZoomResult result;
     result.k1 = state_.k1;
     result.cost = DataCost(state_);
@@ -222,7 +182,7 @@ class ZoomSolve {
 
   // The reduced system of focal lengths and k1 with their priors, poses eliminated.
   void Reduce(double damping, Eigen::MatrixXd& h, Eigen::VectorXd& g,
-              std::vector<PairNormal>& normals) const {
+              std::vector<Normal>& normals) const {
     const auto photos = static_cast<long>(graph_.photos.size());
     const double noise = kPriorNoise * kPriorNoise;
     h = Eigen::MatrixXd::Zero(photos + 2, photos + 2);
@@ -235,13 +195,11 @@ class ZoomSolve {
     normals.resize(pairs_.size());
     ParallelFor(0, static_cast<int>(pairs_.size()), options_.threads, [&](int i) {
       const auto p = static_cast<size_t>(i);
-      normals[p] = NormalOf(pairs_[p], LensesOf(state_, p), state_.poses[p]);
+      normals[p] = NormalOfZoom(pairs_[p], LensesOf(state_, p), state_.poses[p]);
     });
     for (size_t p = 0; p < normals.size(); ++p) {
-      PairNormal& n = normals[p];
-      n.h.diagonal().head<5>() *= 1 + damping;
-      n.h.diagonal().head<5>().array() += 1e-9;
-      AddReduced(n, p, photos, h, g);
+      normals[p].DampPose(damping);
+      AddReduced(normals[p].WithoutPose(), p, photos, h, g);
     }
     for (long i = 0; i < photos + 2; ++i) {
       if (i != photos ? options_.focal_is_fixed : options_.k1_is_fixed) Fix(i, h, g);
@@ -261,18 +219,13 @@ class ZoomSolve {
     g[common] -= weight * r;
   }
 
-  void AddReduced(const PairNormal& n, size_t pair, long photos, Eigen::MatrixXd& h,
+  void AddReduced(const Normal::Reduced& reduced, size_t pair, long photos, Eigen::MatrixXd& h,
                   Eigen::VectorXd& g) const {
-    const auto pose = n.h.topLeftCorner<5, 5>().ldlt();
-    const Eigen::Matrix<double, 5, 3> across = n.h.topRightCorner<5, 3>();
-    const Eigen::Matrix3d reduced =
-        n.h.bottomRightCorner<3, 3>() - across.transpose() * pose.solve(across);
-    const Eigen::Vector3d right = n.g.tail<3>() - across.transpose() * pose.solve(n.g.head<5>());
-    const long at[3] = {static_cast<long>(graph_.ends[pair].first),
-                        static_cast<long>(graph_.ends[pair].second), photos};
-    for (int i = 0; i < 3; ++i) {
-      g[at[i]] += right[i];
-      for (int j = 0; j < 3; ++j) h(at[i], at[j]) += reduced(i, j);
+    const long at[kOfLenses] = {static_cast<long>(graph_.ends[pair].first),
+                                static_cast<long>(graph_.ends[pair].second), photos};
+    for (int i = 0; i < kOfLenses; ++i) {
+      g[at[i]] += reduced.g[i];
+      for (int j = 0; j < kOfLenses; ++j) h(at[i], at[j]) += reduced.h(i, j);
     }
   }
 
@@ -286,7 +239,7 @@ class ZoomSolve {
   bool Step(double damping) {
     Eigen::MatrixXd h;
     Eigen::VectorXd g;
-    std::vector<PairNormal> normals;
+    std::vector<Normal> normals;
     Reduce(damping, h, g, normals);
     Eigen::VectorXd step = -h.ldlt().solve(g);
     if (!step.allFinite()) return false;
@@ -300,13 +253,9 @@ class ZoomSolve {
     moved.k1 += step[photos];
     moved.common *= std::exp(step[photos + 1]);
     for (size_t p = 0; p < normals.size(); ++p) {
-      const PairNormal& n = normals[p];
-      const Eigen::Vector3d of_pair(step[static_cast<long>(graph_.ends[p].first)],
-                                    step[static_cast<long>(graph_.ends[p].second)], step[photos]);
-      const Eigen::Matrix<double, 5, 1> right =
-          n.g.head<5>() + n.h.topRightCorner<5, 3>() * of_pair;
-      const Eigen::Matrix<double, 5, 1> move = -n.h.topLeftCorner<5, 5>().ldlt().solve(right);
-      if (move.allFinite()) moved.poses[p] = PoseDerivatives(state_.poses[p]).Moved(move);
+      const Normal::Vector of_pair(step[static_cast<long>(graph_.ends[p].first)],
+                                   step[static_cast<long>(graph_.ends[p].second)], step[photos]);
+      moved.poses[p] = PoseDerivatives(state_.poses[p]).Moved(normals[p].PoseStep(of_pair));
     }
     const double cost = Cost(moved);
     if (!(cost < cost_)) return false;
@@ -318,19 +267,14 @@ class ZoomSolve {
   std::vector<double> Deviations() const {
     Eigen::MatrixXd h;
     Eigen::VectorXd g;
-    std::vector<PairNormal> normals;
+    std::vector<Normal> normals;
     Reduce(0, h, g, normals);
-    double weights = 0, squares = 0;
-    for (const PairNormal& n : normals) {
-      weights += n.weights;
-      squares += n.squares;
-    }
+    const double noise = NoiseVariance(normals);
     std::vector<double> deviations(graph_.photos.size(), std::numeric_limits<double>::infinity());
-    if (!(weights > 0)) return deviations;
+    if (!std::isfinite(noise)) return deviations;
     const Eigen::MatrixXd inverse = h.ldlt().solve(Eigen::MatrixXd::Identity(h.rows(), h.cols()));
     for (size_t i = 0; i < deviations.size(); ++i) {
-      const double variance =
-          inverse(static_cast<long>(i), static_cast<long>(i)) * squares / weights;
+      const double variance = inverse(static_cast<long>(i), static_cast<long>(i)) * noise;
       if (variance >= 0) deviations[i] = std::sqrt(variance);
     }
     return deviations;
