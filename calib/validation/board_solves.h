@@ -13,6 +13,9 @@
 
 namespace dtr::calib {
 
+/// Share of an image in which limits in pixels hold: corners of it may be beyond any board.
+inline constexpr double kMaxOfImage = 0.95;
+
 /// A solve from scratch, or why there is none.
 struct Fresh {
   std::optional<RigSolution> solution;

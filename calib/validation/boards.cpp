@@ -9,6 +9,7 @@
 
 #include "calib/distributions.h"
 #include "calib/precision.h"
+#include "calib/validation/board_differences.h"
 #include "calib/validation/board_patterns.h"
 #include "calib/validation/board_residuals.h"
 #include "calib/validation/board_solves.h"
@@ -21,8 +22,7 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr int kMinInRegion = 20;  // corners; below, a region's RMS is a guess
-constexpr double kMaxOfImage = 0.95;
-constexpr double kFar = 1000;  // times the boards' distance: as good as at infinity
+constexpr double kFar = 1000;     // times the boards' distance: as good as at infinity
 
 // All that is tested, step by step.
 class BoardValidator {
@@ -64,7 +64,10 @@ class BoardValidator {
     StepDone();
     TestResiduals();
     StepDone();
-    TestStoredAgainstFresh();
+    for (Check& check : TestDifferences(calibration_, kept_, test_views_ ? &fresh_ : nullptr,
+                                        limits_, report_.cameras)) {
+      Add(std::move(check));
+    }
     TestData();
     StepDone();
     TestTerms();
@@ -234,116 +237,6 @@ class BoardValidator {
     Add(AtMost("worst_region_ratio", worst >= 0 ? worst : kNaN, limits_.max_region_ratio, where));
   }
 
-  // What the stored calibration is held against: a solve of the views that made it, which must be
-  // the same numbers, and one of unseen views, which errs by itself. The worse of both is reported.
-  struct Reference {
-    const Fresh& fresh;
-    bool test_views = false;
-    double Limit(double min_p, double self, int count) const {
-      return test_views ? std::sqrt(ChiSquaredLimit(min_p, count)) : self;
-    }
-  };
-
-  void TestStoredAgainstFresh() {
-    const double self = limits_.max_self_difference_sigmas;
-    std::vector<Reference> references;
-    if (!calibration_.kept.empty()) references.push_back({kept_, false});
-    if (test_views_) references.push_back({fresh_, true});
-    const bool rig = calibration_.cameras.size() > 1;
-    Check lens{"lens_difference_sigmas", -1, self, true, ""};
-    Check place{"place_difference_sigmas", -1, self, true, ""};
-    Check scale{"rig_scale_sigmas", -1, self, true, ""};
-    for (const Reference& reference : references) {
-      if (reference.fresh.solution) {
-        TestAgainst(reference, lens, place, scale);
-        continue;
-      }
-      lens = NotTested("lens_difference_sigmas", self, reference.fresh.refused);
-      place = NotTested("place_difference_sigmas", self, reference.fresh.refused);
-      break;
-    }
-    if (calibration_.free_lenses) Add(lens);
-    if (!rig) return;
-    Add(place);
-    if (scale.value >= 0) Add(scale);
-  }
-
-  void TestAgainst(const Reference& reference, Check& lens, Check& place, Check& scale) {
-    const RigSolution& solution = *reference.fresh.solution;
-    const Eigen::VectorXd difference =
-        Difference(solution.layout, calibration_.cameras, solution.rig.cameras);
-    Eigen::MatrixXd covariance = solution.covariance;
-    // Unseen views: both calibrations err.
-    if (reference.test_views && kept_.solution) covariance += kept_.solution->covariance;
-    const ProjectionSensitivity sensitivity(solution);
-    for (size_t c = 0; c < calibration_.cameras.size(); ++c) {
-      ValidatedCamera& camera = report_.cameras[c];
-      camera.difference = ShiftMap(solution, sensitivity, difference, c,
-                                   BoardDistance(calibration_.board, solution.rig, c));
-      if (solution.layout.LensAt(c) >= 0) {
-        Hold(reference, solution.layout, difference, covariance, solution.layout.LensAt(c),
-             FreeParameterCount(calibration_.cameras[c].model), c, lens);
-      }
-      if (solution.layout.PlaceAt(c) >= 0) {
-        Hold(reference, solution.layout, difference, covariance, solution.layout.PlaceAt(c), 6, c,
-             place);
-      }
-    }
-    if (calibration_.cameras.size() > 1) {
-      TestScale(reference, solution, covariance, difference, scale);
-    }
-  }
-
-  static const char* NameOfSolve(const Reference& reference) {
-    return reference.test_views ? "the held-out views'" : "fresh";
-  }
-
-  // Keeps in `check` the part that is farthest beyond its limit.
-  void Hold(const Reference& reference, const RigLayout& layout, const Eigen::VectorXd& difference,
-            const Eigen::MatrixXd& covariance, int at, int count, size_t camera, Check& check) {
-    double distance = Distance(difference, covariance, at, count);
-    const double limit = reference.Limit(limits_.min_p, limits_.max_self_difference_sigmas, count);
-    std::string reason = fmt::format("{}: stored less {} solve; {}; up to {:.3g} px in the image",
-                                     calibration_.cameras[camera].name, NameOfSolve(reference),
-                                     LargestPart(layout, difference, covariance, at, count),
-                                     report_.cameras[camera].difference.Largest());
-    // What was calibrated elsewhere does not say how uncertain it is: pixels must do.
-    const double shown_px = report_.cameras[camera].difference.Quantile(kMaxOfImage);
-    if (calibration_.kept.empty() && distance > limit && shown_px <= limits_.max_uncertainty_px) {
-      reason += fmt::format(
-          "; {:.3g} sigma of that solve alone, for the file does not say what it is uncertain by, "
-          "but at most {:.3g} px in 95 % of the image, where {:.3g} px are allowed",
-          distance, shown_px, limits_.max_uncertainty_px);
-      distance = 0;
-    }
-    if (check.value >= 0 && !(distance / limit > check.value / check.limit)) return;
-    check = {check.name, distance, limit, distance <= limit, std::move(reason)};
-  }
-
-  // One factor on all shifts: another size of the board.
-  void TestScale(const Reference& reference, const RigSolution& solution,
-                 const Eigen::MatrixXd& covariance, const Eigen::VectorXd& difference,
-                 Check& check) {
-    Eigen::VectorXd direction = Eigen::VectorXd::Zero(difference.size());
-    for (size_t c = 1; c < solution.rig.cameras.size(); ++c) {
-      direction.segment<3>(solution.layout.PlaceAt(c) + 3) =
-          solution.rig.cameras[c].cam_from_rig.translation;
-    }
-    const double squares = direction.squaredNorm();
-    if (!(squares > 0)) return;  // cameras in one point: no length to compare
-    const double scale = direction.dot(difference) / squares;
-    const double sigma = std::sqrt(direction.dot(covariance * direction)) / squares;
-    const double value =
-        sigma > 0 ? std::abs(scale) / sigma : std::numeric_limits<double>::infinity();
-    const double limit = reference.Limit(limits_.min_p, limits_.max_self_difference_sigmas, 1);
-    if (check.value >= 0 && !(value / limit > check.value / check.limit)) return;
-    check = AtMost(
-        "rig_scale_sigmas", value, limit,
-        fmt::format("stored distances between cameras are {:+.4f} % (+- {:.4f} %) off "
-                    "what squares of {} say, by {} solve",
-                    100 * scale, 100 * sigma, calibration_.board.square, NameOfSolve(reference)));
-  }
-
   void TestData() {
     Rig fitted = fitted_;
     if (test_views_ && kept_.solution) fitted = kept_.solution->rig;
@@ -389,12 +282,12 @@ class BoardValidator {
       const Eigen::MatrixXd covariance = solution.covariance.block(at, at, count, count);
       const TermUncertainty term = MostUncertainTerm(camera.model, camera.camera, covariance);
       if (term.index < 0 || term.share <= check.value) continue;
-      check = AtMost(name, term.share, limits_.max_term_share,
-                     fmt::format("{}: {} ({}); its standard deviation moves the image's corner by "
-                                 "this share of its distance",
-                                 camera.name,
-                                 TextOfTerm(camera.model, camera.camera, covariance, term.index),
-                                 NameOf(camera.model)));
+      check = AtMost(
+          name, term.share, limits_.max_term_share,
+          fmt::format("{}: {} ({}); its standard deviation moves the image's corner by "
+                      "this share of its distance",
+                      camera.name, TextOfTerm(camera.model, camera.camera, covariance, term.index),
+                      NameOf(camera.model)));
     }
     Add(std::move(check));
   }
