@@ -38,4 +38,21 @@ ResidualStats Summarise(const std::vector<Eigen::Vector2d>& residuals) {
   return stats;
 }
 
+double CauchyLoss(double residual_px, double scale_px) {
+  return scale_px * scale_px * std::log1p(std::pow(residual_px / scale_px, 2));
+}
+
+LossDecrease DecreaseOfLoss(const std::vector<double>& before_px,
+                            const std::vector<double>& after_px, double scale_px) {
+  double sum = 0, squares = 0;
+  for (size_t i = 0; i < before_px.size(); ++i) {
+    const double fell = CauchyLoss(before_px[i], scale_px) - CauchyLoss(after_px[i], scale_px);
+    sum += fell;
+    squares += fell * fell;
+  }
+  const auto n = static_cast<double>(before_px.size());
+  const double mean = sum / n;
+  return {mean, std::sqrt(std::max(0.0, squares / n - mean * mean) / n)};
+}
+
 }  // namespace dtr::calib

@@ -36,4 +36,15 @@ int CellOf(double at_px, int size_px, int cells);
 /// Percentiles by nearest rank: the smallest length with at least the share at or below it.
 ResidualStats Summarise(const std::vector<Eigen::Vector2d>& residuals);
 
+/// Cauchy's loss of a residual: scale^2 log(1 + (residual / scale)^2), px^2.
+double CauchyLoss(double residual_px, double scale_px);
+
+/// How far the mean loss of the same observations fell, px^2.
+struct LossDecrease {
+  double mean = 0;
+  double deviation = 0;  ///< standard deviation of the mean
+};
+LossDecrease DecreaseOfLoss(const std::vector<double>& before_px,
+                            const std::vector<double>& after_px, double scale_px);
+
 }  // namespace dtr::calib

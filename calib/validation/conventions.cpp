@@ -7,6 +7,7 @@
 #include <numeric>
 #include <optional>
 
+#include "calib/residuals.h"
 #include "calib/validation/camera_hypotheses.h"
 #include "dtr/base/order_statistics.h"
 
@@ -86,28 +87,17 @@ std::vector<double> ResidualsOf(const std::vector<Match>& matches,
 
 double Median(std::vector<double> values) { return UpperMedian(values); }
 
-double LossOf(double residual_px, double scale_px) {
-  return scale_px * scale_px * std::log1p(std::pow(residual_px / scale_px, 2));
-}
-
 double MeanLoss(const std::vector<double>& residuals, double scale_px) {
   double sum = 0;
-  for (const double r : residuals) sum += LossOf(r, scale_px);
+  for (const double r : residuals) sum += CauchyLoss(r, scale_px);
   return sum / static_cast<double>(residuals.size());
 }
 
 // How surely the mean loss fell, in standard deviations of the mean difference.
 double SigmasFallen(const std::vector<double>& before, const std::vector<double>& after,
                     double scale_px) {
-  double sum = 0, squares = 0;
-  for (size_t i = 0; i < before.size(); ++i) {
-    const double fell = LossOf(before[i], scale_px) - LossOf(after[i], scale_px);
-    sum += fell;
-    squares += fell * fell;
-  }
-  const auto n = static_cast<double>(before.size());
-  const double mean = sum / n, variance = squares / n - mean * mean;
-  return variance > 0 ? mean / std::sqrt(variance / n) : 0;
+  const auto [mean, deviation] = DecreaseOfLoss(before, after, scale_px);
+  return deviation > 0 ? mean / deviation : 0;
 }
 
 // Radial distortion that the matches ask for, where the cameras have none: searched, as no file

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "calib/lens_map.h"
+#include "calib/residuals.h"
 #include "dtr/base/order_statistics.h"
 #include "pipeline/detail/import/camera_distortion.h"
 
@@ -53,8 +54,8 @@ std::vector<Observation> SomeObservations(const io::ForeignScene& scene,
 enum class Origin { kOwn, kMiddle, kCorner, kLowerCorner, kPrincipal };
 enum class Lens { kOwn, kProjected, kProjectedNegated, kMeasured, kMeasuredNegated, kPerPixel };
 
-// A way to take a file.
-struct Way {
+// How a file may be meant.
+struct Convention {
   Origin origin = Origin::kOwn;
   Lens lens = Lens::kOwn;
   bool y_up = false;    // of pixels, against the format
@@ -68,20 +69,20 @@ struct Way {
 };
 
 // The format's own first, then COLMAP's, so that what is in use is preferred to what might be.
-std::vector<Way> AllWays() {
-  std::vector<Way> ways = {{}, {Origin::kCorner, Lens::kProjectedNegated}};
+std::vector<Convention> AllConventions() {
+  std::vector<Convention> conventions = {{}, {Origin::kCorner, Lens::kProjectedNegated}};
   for (const bool turned : {false, true}) {
     for (const bool y_up : {false, true}) {
       for (const Origin origin : {Origin::kOwn, Origin::kMiddle, Origin::kCorner,
                                   Origin::kLowerCorner, Origin::kPrincipal}) {
         for (const Lens lens : {Lens::kOwn, Lens::kProjectedNegated, Lens::kProjected,
                                 Lens::kMeasured, Lens::kMeasuredNegated, Lens::kPerPixel}) {
-          ways.push_back({origin, lens, y_up, turned});
+          conventions.push_back({origin, lens, y_up, turned});
         }
       }
     }
   }
-  return ways;
+  return conventions;
 }
 
 // Radial coefficients of a camera and whether they are of the measured point; empty: it has none
@@ -106,19 +107,20 @@ void SetRadial(const Radial& radial, io::NamedCamera& named) {
   named.distortion = io::Distortion{radial.measured ? "INVERSE_RADIAL" : "OPENCV", params};
 }
 
-// False where the way does not apply to the camera's distortion, or says the same as its own.
-bool SetLens(Lens way, io::NamedCamera& named) {
-  if (way == Lens::kOwn) return true;
+// False where the convention does not apply to the camera's distortion, or says the same as its
+// own.
+bool SetLens(Lens lens, io::NamedCamera& named) {
+  if (lens == Lens::kOwn) return true;
   const auto own = RadialOf(named);
   if (!own) return false;
   const bool measured =
-      way == Lens::kMeasured || way == Lens::kMeasuredNegated || way == Lens::kPerPixel;
-  const bool negated = way == Lens::kProjectedNegated || way == Lens::kMeasuredNegated;
+      lens == Lens::kMeasured || lens == Lens::kMeasuredNegated || lens == Lens::kPerPixel;
+  const bool negated = lens == Lens::kProjectedNegated || lens == Lens::kMeasuredNegated;
   if (measured && own->k2 != 0) return false;  // the formula has one coefficient
-  if (way != Lens::kPerPixel && measured == own->measured && !negated) return false;
+  if (lens != Lens::kPerPixel && measured == own->measured && !negated) return false;
   Radial radial{measured, own->k1, own->k2};
   if (negated) radial = {measured, -own->k1, -own->k2};
-  if (way == Lens::kPerPixel) radial.k1 *= named.camera.fx_px() * named.camera.fx_px();
+  if (lens == Lens::kPerPixel) radial.k1 *= named.camera.fx_px() * named.camera.fx_px();
   if (!std::isfinite(radial.k1)) return false;
   SetRadial(radial, named);
   return true;
@@ -136,15 +138,16 @@ bool SetOrigin(Origin origin, PlacedCamera& camera) {
   return camera.shift != before;
 }
 
-// The cameras taken so; empty where that is a way that another one is, too.
-std::optional<std::vector<PlacedCamera>> Taken(const Way& way, std::vector<PlacedCamera> cameras) {
+// The cameras taken so; empty where another convention means the same.
+std::optional<std::vector<PlacedCamera>> Taken(const Convention& convention,
+                                               std::vector<PlacedCamera> cameras) {
   const Pose half_turn{Eigen::Quaterniond(0, 1, 0, 0), Vector3d::Zero()};  // about x
   bool has_lens = false, has_origin = false;
   for (PlacedCamera& camera : cameras) {
-    has_lens |= SetLens(way.lens, camera.named);
-    has_origin |= SetOrigin(way.origin, camera);
-    camera.y_up = camera.y_up != way.y_up;
-    if (way.turned) camera.named.cam_from_world = half_turn * camera.named.cam_from_world;
+    has_lens |= SetLens(convention.lens, camera.named);
+    has_origin |= SetOrigin(convention.origin, camera);
+    camera.y_up = camera.y_up != convention.y_up;
+    if (convention.turned) camera.named.cam_from_world = half_turn * camera.named.cam_from_world;
   }
   if (!has_lens || !has_origin) return std::nullopt;
   return cameras;
@@ -179,10 +182,6 @@ std::vector<double> Lengths(const Residuals& residuals, double far_px) {
   return lengths;
 }
 
-double Loss(double residual_px, double scale_px) {
-  return scale_px * scale_px * std::log1p(std::pow(residual_px / scale_px, 2));
-}
-
 double Median(std::vector<double> values) { return UpperMedian(values); }
 
 // Whether residuals became smaller beyond chance.
@@ -191,15 +190,8 @@ bool AreSmaller(const std::vector<double>& now, const std::vector<double>& befor
   if (!(median <= kMinGainShare * median_before)) return false;
   if (!(median_before - median >= kMinGainPx)) return false;
   const double scale_px = std::max(kMinScalePx, median);
-  double sum = 0, squares = 0;
-  for (size_t i = 0; i < now.size(); ++i) {
-    const double fell = Loss(before[i], scale_px) - Loss(now[i], scale_px);
-    sum += fell;
-    squares += fell * fell;
-  }
-  const auto n = static_cast<double>(now.size());
-  const double mean = sum / n, variance = std::max(0.0, squares / n - mean * mean);
-  return mean > 0 && mean * std::sqrt(n) > kMinSigmas * std::sqrt(variance);
+  const auto [mean, deviation] = calib::DecreaseOfLoss(before, now, scale_px);
+  return mean > 0 && mean > kMinSigmas * deviation;
 }
 
 // Moves principal points to where the measurements of their cameras say: those of equal intrinsics
@@ -237,7 +229,7 @@ void TakePrincipalPoints(const std::vector<Observation>& observations, const Res
   }
 }
 
-std::string NameOf(const Way& way) {
+std::string NameOf(const Convention& convention) {
   static const std::map<Origin, const char*> kOrigins = {
       {Origin::kMiddle, "pixels from the image's middle"},
       {Origin::kCorner, "pixels from the image's corner"},
@@ -253,15 +245,15 @@ std::string NameOf(const Way& way) {
   const auto add = [&](const char* part) {
     name += (name.empty() ? "" : ", ") + std::string(part);
   };
-  if (way.origin != Origin::kOwn) add(kOrigins.at(way.origin));
-  if (way.y_up) add("y the other way up");
-  if (way.turned) add("cameras that look the other way along z, with y turned, too");
-  if (way.lens != Lens::kOwn) add(kLenses.at(way.lens));
+  if (convention.origin != Origin::kOwn) add(kOrigins.at(convention.origin));
+  if (convention.y_up) add("y the other way up");
+  if (convention.turned) add("cameras that look the other way along z, with y turned, too");
+  if (convention.lens != Lens::kOwn) add(kLenses.at(convention.lens));
   return name;
 }
 
 struct Found {
-  Way way;
+  Convention convention;
   bool has_own_centres = false;  // principal points are those of the pixels
   std::vector<PlacedCamera> cameras;
   std::vector<double> lengths;
@@ -269,25 +261,26 @@ struct Found {
 
 // The cameras taken so; where pixels count from a corner with the principal points that they have,
 // if these are others than the file's beyond chance.
-std::optional<Found> TakenSo(const Way& way, const std::vector<Observation>& observations,
+std::optional<Found> TakenSo(const Convention& convention,
+                             const std::vector<Observation>& observations,
                              const std::vector<PlacedCamera>& placed, double far_px) {
-  auto cameras = Taken(way, placed);
+  auto cameras = Taken(convention, placed);
   if (!cameras) return std::nullopt;
   const Residuals residuals = ResidualsOf(observations, *cameras);
-  Found found{way, false, std::move(*cameras), Lengths(residuals, far_px)};
-  if (!way.FromCorner()) return found;
-  Found centred{way, true, found.cameras, {}};
+  Found found{convention, false, std::move(*cameras), Lengths(residuals, far_px)};
+  if (!convention.FromCorner()) return found;
+  Found centred{convention, true, found.cameras, {}};
   TakePrincipalPoints(observations, residuals, centred.cameras);
   centred.lengths = Lengths(ResidualsOf(observations, centred.cameras), far_px);
   return AreSmaller(centred.lengths, found.lengths) ? centred : found;
 }
 
-// The way that fits best, the format's own unless another is better beyond chance.
+// The convention that fits best, the format's own unless another is better beyond chance.
 Found BestWay(const std::vector<Observation>& observations, const std::vector<PlacedCamera>& placed,
               double far_px, double fits_px) {
   Found best{{}, false, placed, Lengths(ResidualsOf(observations, placed), far_px)};
-  for (const Way& way : AllWays()) {
-    auto found = TakenSo(way, observations, placed, far_px);
+  for (const Convention& convention : AllConventions()) {
+    auto found = TakenSo(convention, observations, placed, far_px);
     if (!found || !(Median(found->lengths) <= fits_px)) continue;
     if (AreSmaller(found->lengths, best.lengths)) best = std::move(*found);
   }
@@ -306,11 +299,11 @@ std::string SettleConventions(const io::ForeignScene& scene, const std::string& 
   const double far_px = kFarShare * side_px, fits_px = std::max(kFitsPx, kFitsShare * side_px);
   const double own_px = Median(Lengths(ResidualsOf(observations, placed), side_px));
   Found best = BestWay(observations, placed, far_px, fits_px);
-  const std::string name = NameOf(best.way);
+  const std::string name = NameOf(best.convention);
   if (name.empty()) return "";
   const char* also = best.has_own_centres ? ", principal points as these pixels have them" : "";
   placed = std::move(best.cameras);
-  const bool colmaps = scene.conventions_of == "VisualSFM" && best.way.IsColmapsNvm();
+  const bool colmaps = scene.conventions_of == "VisualSFM" && best.convention.IsColmapsNvm();
   return fmt::format(
       "{}: its points lie {:.2g} px from where its cameras see them with {}{}{}; {}{:.3g} px as {} "
       "writes this format (median of {})",

@@ -26,15 +26,15 @@ struct PlacedCamera {
 /// Index of cameras that have no photo here.
 inline constexpr size_t kNotPlaced = ~size_t{0};
 
-/// Programs write each other's formats in their own ways. Projects the points of a file with its
-/// cameras in each way that is in use (pixels from the image's middle, its corner or the principal
-/// point, y down or up; cameras that look along z or, with y up, along -z; distortion of the
-/// measured or of the projected point, with either sign, per focal length or per pixel), and takes
-/// the one that brings them to where the file says that photos show them. The format's own is left
-/// only for a way that is better beyond chance: the loss falls by more than 6 standard deviations
-/// of its mean. Where pixels count from the corner, the principal point is taken from them as well.
-/// `placed` becomes what was found; `place`: index into it of each camera of the scene, or
-/// kNotPlaced. Returns one line where it is not the format's own way, else "".
+/// Programs write each other's formats by their own conventions. Projects the points of a file with
+/// its cameras by each convention in use (pixels from the image's middle, its corner or the
+/// principal point, y down or up; cameras that look along z or, with y up, along -z; distortion of
+/// the measured or of the projected point, with either sign, per focal length or per pixel), and
+/// takes the one that brings them to where the file says that photos show them. The format's own is
+/// left only for one that is better beyond chance: the loss falls by more than 6 standard
+/// deviations of its mean. Where pixels count from the corner, the principal point is taken from
+/// them as well. `placed` becomes what was found; `place`: index into it of each camera of the
+/// scene, or kNotPlaced. Returns one line where it is not the format's own, else "".
 std::string SettleConventions(const io::ForeignScene& scene, const std::string& source,
                               const std::vector<size_t>& place, std::vector<PlacedCamera>& placed);
 
