@@ -67,7 +67,7 @@ class Walker {
   }
 
  private:
-  // False where the folder has been read already: links may lead to one twice, or round in a
+  // False where the folder has been read already: links may lead to one twice, or in a
   // circle.
   bool MarkRead(const fs::path& folder) {
     std::error_code error;

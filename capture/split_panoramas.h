@@ -16,7 +16,7 @@ enum class PanoramaUse {
 };
 
 /// Whether the photos are panoramas to be split. With kAuto, where fewer than half as many photos
-/// are of one kind as of the other, these are moved to `capture.skipped`, and `progress` is told.
+/// are of one kind as of the other, these are moved to `capture.skipped`, and `progress` has a note.
 /// Throws Error where some are panoramas and about as many are not, and where one's size is not
 /// that of an equirectangular panorama. Adds remarks where photos are twice as wide as high, or
 /// state another projection, and are taken as they are.

@@ -18,8 +18,8 @@ struct BoardCalibrationOptions {
   std::uint64_t seed = 0;
 };
 
-/// Solves for the camera `name` behind the photos; `progress` is told of the solves that choose the
-/// model, and asked whether to stop. Throws Error as SolveBoard and ChooseModel do.
+/// Solves for the camera `name` behind the photos; `progress` shows the solves that choose the
+/// model, and may interrupt. Throws Error as SolveBoard and ChooseModel do.
 calib::Calibration CalibrateBoard(const calib::Board& board, const BoardPhotos& photos,
                                   const std::string& name, const BoardCalibrationOptions& options,
                                   Progress& progress);

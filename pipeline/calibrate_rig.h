@@ -37,8 +37,8 @@ struct RigSummary {
   calib::PatternTest unsteady;  ///< images that keep no common rate (calib/validation)
 };
 
-/// Solves for the rig behind the photos; `progress` is told of the solves and asked whether to
-/// stop. Throws UsageError when lenses are given for some cameras and not for others, Error as
+/// Solves for the rig behind the photos; `progress` shows the solves and may interrupt.
+/// Throws UsageError when lenses are given for some cameras and not for others, Error as
 /// SolveRig and ChooseModel do.
 calib::Calibration CalibrateRig(const calib::Board& board, const RigPhotos& photos,
                                 const RigCalibrationOptions& options, RigSummary* summary,

@@ -30,7 +30,7 @@ struct RefineOptions {
   std::string advice = {};
   int threads = 0;
   std::uint64_t seed = 0;  ///< of the observations that are held out
-  /// AdjustOptions::progress of every solve; told of each, too, as a stage. Null: nobody.
+  /// AdjustOptions::progress of every solve, each of which is a stage; may be null.
   Progress* progress = nullptr;
 };
 

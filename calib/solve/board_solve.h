@@ -28,7 +28,7 @@ struct SolveOptions {
   /// Reject a distortion that turns back inside the image (CoversImage). Off where a camera only
   /// has to explain boards and will not be kept.
   bool cover_image = true;
-  /// Told of every pass of a rig's solve, and asked before it whether to stop. Null: nobody.
+  /// Shows every iteration of a rig's solve, and may interrupt before it; may be null.
   Progress* progress = nullptr;
 };
 

@@ -17,7 +17,7 @@ struct ChoiceOptions {
   double confidence = 0.95;  ///< of its intervals
   std::uint64_t seed = 0;
   int threads = 0;  ///< 0: all cores; the result is the same for any number
-  /// Told of every solve, as a stage of this name, and asked whether to stop. Null: nobody.
+  /// Shows every solve, as a stage of this name, and may interrupt; may be null.
   Progress* progress = nullptr;
   std::string stage = "choosing the camera model";
 };

@@ -100,7 +100,7 @@ struct BoardValidation {
 
 /// Everything docs/VALIDATION.md lists, in its order. A test that cannot be made fails and says
 /// why; a degeneracy is named. `distances` (board units, > 0): where else uncertainty is reported,
-/// which breaks no test. `progress` is told of the steps and asked whether to stop. Requires kept
+/// which breaks no test. `progress` shows the steps and may interrupt. Requires kept
 /// or unseen views of every camera; throws Error without.
 BoardValidation ValidateBoards(const ValidatedCalibration& calibration,
                                const std::optional<TestViews>& test_views,

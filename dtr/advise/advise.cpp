@@ -133,7 +133,7 @@ Advice Advise(std::span<const CoarseView> views, const AdviseOptions& options, P
   if (views.size() < 2) throw std::invalid_argument("Advise: fewer than 2 views");
   Advice advice;
   advice.redundant = FindRedundant(views, options, progress);
-  // Who is told to leave cameras out must not be asked for another one between them.
+  // Whoever is advised to leave cameras out must not be asked for another one between them.
   const std::vector<CoarseView> staying = Without(views, advice.redundant);
   advice.places = PlacesAmong(views, NearestNames(views, staying));
   const int count = static_cast<int>(advice.places.size());

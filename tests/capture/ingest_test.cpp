@@ -112,7 +112,7 @@ TEST(IngestPhotos, LinksToFoldersAreFollowedOnce) {
   link("elsewhere", "linked");
   link("elsewhere", "twice");              // what "linked" leads to
   link("elsewhere/deeper", "deeper");      // comes before "linked", which holds it
-  link("photos/own", "round");             // read as it stands
+  link("photos/own", "loop");              // read as it stands
   link("", "up");                          // holds all this
   fs::create_directory_symlink(folder / "photos", folder / "elsewhere/back");
   const Capture capture = Ingest(folder / "photos");
@@ -122,7 +122,7 @@ TEST(IngestPhotos, LinksToFoldersAreFollowedOnce) {
   EXPECT_THAT(skipped,
               ElementsAre("linked/back: links to a folder that holds this one",
                           "linked/deeper: is read already, by a link to it",
-                          "round: links to a folder that is read already",
+                          "loop: links to a folder that is read already",
                           "twice: links to a folder that is read already",
                           "up: links to a folder that holds this one"));
 }
