@@ -10,6 +10,7 @@ namespace dtr {
 namespace {
 
 constexpr size_t kMaxKeys = 8;        // more keys make a path follow the photographer's steps
+constexpr size_t kMaxChained = 2048;  // chaining takes time by the square of their number
 constexpr int kStepsPerSegment = 64;  // of the table that evens out the speed
 
 struct Key {
@@ -51,13 +52,12 @@ std::vector<Key> Chain(std::vector<Key> keys) {
   }
 }
 
-std::vector<Key> Thinned(const std::vector<Key>& chain) {
-  if (chain.size() <= kMaxKeys) return chain;
-  std::vector<Key> keys;
-  for (size_t i = 0; i < kMaxKeys; ++i) {
-    keys.push_back(chain[i * (chain.size() - 1) / (kMaxKeys - 1)]);
-  }
-  return keys;
+/// At most `max` of the keys at even steps, the first and the last among them.
+std::vector<Key> Thinned(std::vector<Key> keys, size_t max) {
+  if (keys.size() <= max) return keys;
+  std::vector<Key> thinned;
+  for (size_t i = 0; i < max; ++i) thinned.push_back(keys[i * (keys.size() - 1) / (max - 1)]);
+  return thinned;
 }
 
 /// Neighbouring quaternions in one half space: q and -q are the same rotation.
@@ -199,7 +199,7 @@ void RequireFrames(int frames) {
 
 std::vector<NovelCamera> FlyThrough(const DtrSet& set, int frames) {
   RequireFrames(frames);
-  const std::vector<Key> keys = Thinned(Chain(SourceKeys(set)));
+  const std::vector<Key> keys = Thinned(Chain(Thinned(SourceKeys(set), kMaxChained)), kMaxKeys);
   if (keys.size() == 1) {
     return std::vector<NovelCamera>(static_cast<size_t>(frames),
                                     {keys[0].view->camera, keys[0].view->cam_from_world});
