@@ -15,15 +15,9 @@ namespace fs = std::filesystem;
 
 class FullDiskOf : public WritingCommandTest {
  protected:
-  // What lies in a folder; a set's record of times is left out.
-  static std::map<std::string, std::string> All(const fs::path& folder) {
-    std::map<std::string, std::string> all = Contents(folder);
-    std::erase_if(all, [](const auto& item) { return item.first.ends_with("/report/run.json"); });
-    return all;
-  }
-  // Of it what bears its own name: work in progress, and what says that it is, are left out.
+  // The files that bear their own names: work in progress, and what says that it is, are left out.
   static std::map<std::string, std::string> Whole(const fs::path& folder) {
-    std::map<std::string, std::string> whole = All(folder);
+    std::map<std::string, std::string> whole = Contents(folder);
     std::erase_if(whole, [](const auto& item) {
       return item.first.find(".partial/") != std::string::npos || item.first.ends_with(".lock");
     });
@@ -62,7 +56,7 @@ TEST_P(FullDiskOf, IsSaidInOneLineLosesNothingAndRoomMakesItWhole) {
   Prepare(plain);
   Prepare(full);
   EXPECT_TRUE(IsDone(Dtr(In(plain))));
-  const auto expected = All(plain);
+  const auto expected = Contents(plain);
   const auto before = Whole(full);
   const long used_kib = UsedKib(full);
   int stops = 0;
@@ -75,7 +69,7 @@ TEST_P(FullDiskOf, IsSaidInOneLineLosesNothingAndRoomMakesItWhole) {
     ExpectNothingLostOrHalf(before, expected, Whole(full));
   }
   EXPECT_GE(stops, GetParam().min_stops);
-  const auto found = All(full);
+  const auto found = Contents(full);
   if (GetParam().repeats) {
     EXPECT_THAT(DifferingFiles(expected, found), ::testing::IsEmpty());
   }
