@@ -14,6 +14,7 @@
 #include "calib/bundle/lens_params.h"
 #include "calib/bundle/normalised.h"
 #include "calib/bundle/observation_rows.h"
+#include "calib/bundle/parallax.h"
 #include "calib/bundle/plain/minimise_bundle.h"
 #include "calib/bundle/priors.h"
 #include "calib/bundle/rig_adjust.h"
@@ -331,15 +332,18 @@ Adjusted Solve(const Bundle& bundle, const std::vector<LensCamera>& known,
     sigma = next;
     if (settled) break;
   }
-  const auto limit = [&] {
-    return options.outlier_sigmas > 0 ? options.outlier_sigmas * std::max(sigma, kMinOutlierSigmaPx)
-                                      : none;
+  const auto counting = [&] {
+    if (!(options.outlier_sigmas > 0)) return Within(residuals, none);
+    std::vector<bool> used =
+        Within(residuals, options.outlier_sigmas * std::max(sigma, kMinOutlierSigmaPx));
+    if (!options.fix_poses) LeaveOutWithoutParallax(bundle, n, sigma, used);
+    return used;
   };
-  out.used = Within(residuals, limit());
+  out.used = counting();
   for (int pass = 0; pass < kMaxOutlierPasses; ++pass) {
     out.converged = solve(out.used, 0);
     sigma = SigmaOf(bundle, residuals);
-    std::vector<bool> used = Within(residuals, limit());
+    std::vector<bool> used = counting();
     out.unsettled = Differences(used, out.used);
     if (out.unsettled == 0) break;
     if (pass + 1 < kMaxOutlierPasses) out.used = std::move(used);

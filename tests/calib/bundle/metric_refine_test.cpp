@@ -161,6 +161,13 @@ TEST(RefineInMetres, GpsHoldsAWalkThatNoiseHasBentWhateverTheLensesAreAllowed) {
   }
 }
 
+TEST(RefineInMetres, BracketsOfOnePlaceConvergeWithTheirPlaces) {
+  const Bundle truth = MakeBundle(testing::Brackets());
+  const Held held = Hold(Moved(testing::Perturbed(truth, 0.005)), Places(truth, 0.1));
+  EXPECT_LT(OffM(held.refined.model, truth), 0.1);
+  EXPECT_LT(held.refined.solve.iterations, 150);
+}
+
 TEST(RefineInMetres, AWrongPlaceIsNamedAndLeftOut) {
   const Bundle truth = MakeBundle(Walk());
   const SfmModel model = Found(truth, WrongLens(truth.lenses[0]));

@@ -7,9 +7,13 @@
 
 #include "calib/bundle/covariance.h"
 #include "calib/bundle/held_out.h"
+#include "calib/bundle/one_place.h"
+#include "calib/colmap/model_io.h"
 #include "calib/lens_groups.h"
+#include "calib/similarity.h"
 #include "dtr/base/error.h"
 #include "tests/calib/bundle/synthetic_bundle.h"
+#include "tests/support/test_data.h"
 
 namespace dtr::calib {
 namespace {
@@ -146,8 +150,8 @@ TEST(Refine, LeavesATrueModelAlone) {
   EXPECT_EQ(refined.model.cameras.at(1).params, model.cameras.at(1).params);
 }
 
-// One lens, zoomed photo by photo: every focal length is found, and no principal point or distortion
-// of each photo is freed for it.
+// One lens, zoomed photo by photo: every focal length is found, and no principal point or
+// distortion of each photo is freed for it.
 TEST(Refine, ALensForEveryImageFreesItsFocalLengthAlone) {
   const auto zoom = [](size_t i) { return 1 + 0.4 * static_cast<double>(i % 3); };
   SfmModel model = ModelFrom(MakeBundle(Noisy()));
@@ -168,8 +172,7 @@ TEST(Refine, ALensForEveryImageFreesItsFocalLengthAlone) {
   ASSERT_TRUE(refined.changed) << refined.reason;
   EXPECT_EQ(refined.lens, LensFreedom::kFocal) << ToJson(refined);
   for (size_t i = 0; i < model.images.size(); ++i) {
-    const LensCamera& found =
-        refined.model.cameras.at(refined.model.images[i].camera_id);
+    const LensCamera& found = refined.model.cameras.at(refined.model.images[i].camera_id);
     EXPECT_NEAR(found.params[0] / (900 * zoom(i)), 1, 0.004) << i;
     EXPECT_EQ(found.params[1], lens.params[1]);
     EXPECT_EQ(found.params[3], lens.params[3]);
@@ -220,6 +223,44 @@ TEST(Refine, SeparateLensesAreOnePerImage) {
   const Refined refined = Refine(model, options);
   ASSERT_TRUE(refined.changed);
   EXPECT_EQ(refined.model.cameras.size(), model.images.size());
+}
+
+TEST(Refine, BracketsOfOnePlaceConvergeAndHelpTheOthersNeitherMoreNorLess) {
+  for (const double apart : {0.0, 1e-3, 0.1}) {
+    const Bundle truth = MakeBundle(testing::Brackets(apart));
+    const SfmModel model = ModelFrom(testing::Perturbed(truth, 0.01));
+    const Refined refined = Refine(model, {});
+    ASSERT_TRUE(refined.changed) << apart << ": " << refined.reason;
+    EXPECT_NEAR(refined.solve.sigma_px, 0.3, 0.03) << apart;
+    EXPECT_LT(refined.solve.iterations, 100) << apart;
+    std::vector<Eigen::Vector3d> found, true_ones;
+    for (size_t i = 0; i < truth.images.size(); ++i) {
+      found.push_back(refined.model.images[i].cam_from_world.TargetOriginInSource());
+      true_ones.push_back(truth.images[i].cam_from_world.TargetOriginInSource());
+    }
+    EXPECT_LT(AlignmentRms(AlignPoints(found, true_ones), found, true_ones), 0.02) << apart;
+  }
+}
+
+// Exposure brackets of a drone: two photos from one place and four from another.
+TEST(Refine, TheFieldCasesBracketsConvergeAsItsOtherPhotosDo) {
+  const auto folder = dtr::testing::DataFolder() / "field/brackets_no_convergence/model";
+  DTR_REQUIRE_DATA(folder);
+  const Refined refined = Refine(colmap::ReadModel(folder), {});
+  ASSERT_TRUE(refined.changed) << refined.reason;
+  EXPECT_EQ(refined.lens, LensFreedom::kAll);
+  EXPECT_LT(refined.solve.iterations, 100);
+}
+
+TEST(OnePlace, NamesThePhotosOfEachBracket) {
+  const SfmModel model = ModelFrom(MakeBundle(testing::Brackets()));
+  const std::vector<std::vector<int>> expected{{5, 6}, {8, 9, 10, 11}};
+  EXPECT_EQ(ImagesOfOnePlace(model), expected);
+  EXPECT_EQ(
+      OnePlaceLine(model),
+      "6 photos share 2 positions (exposure brackets, bursts): image105 + image106; image108 + "
+      "image109 + image110 + image111; points that they alone see are left out");
+  EXPECT_EQ(OnePlaceLine(ModelFrom(MakeBundle(Noisy()))), "");
 }
 
 TEST(Refine, TooFewPointsAreLeftAlone) {

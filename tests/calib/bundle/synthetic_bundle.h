@@ -46,4 +46,24 @@ inline SceneSpec Walk(double noise_px = 1) {
   return spec;
 }
 
+/// A flight along a facade with exposure brackets: two photos from the sixth place and four from
+/// the last, to `apart`, which shares some third of its view with the others. What the last four
+/// see beyond has no parallax.
+inline SceneSpec Brackets(double apart = 1e-3) {
+  SceneSpec spec{.images = 12, .points = 700, .noise_px = 0.3};
+  spec.pose = [apart](int i, int) {
+    constexpr double kPlaces[] = {0, 1, 2, 3, 4, 5, 5, 6, 11, 11, 11, 11};
+    Random random(static_cast<std::uint64_t>(100 + i));
+    const Eigen::Vector3d centre(kPlaces[i] + apart * random.Normal(), apart * random.Normal(),
+                                 2 + 0.3 * std::cos(kPlaces[i]) + apart * random.Normal());
+    return LookAt(centre,
+                  centre + Eigen::Vector3d(0.2 * std::sin(2.1 * i), 10, 0.3 * std::cos(1.3 * i)));
+  };
+  spec.point = [](dtr::Random& random) {
+    const double x = random.Uniform(-5, 17), y = random.Uniform(8, 14);
+    return Eigen::Vector3d(x, y, random.Uniform(-2, 6));
+  };
+  return spec;
+}
+
 }  // namespace dtr::testing

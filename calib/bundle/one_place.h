@@ -1,0 +1,17 @@
+// calib/bundle/one_place.h -- photos that were taken from one position: exposure brackets, bursts.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "calib/sfm_model.h"
+
+namespace dtr::calib {
+
+/// Groups of images (indices, rising) from one position: cameras that see points in common, and
+/// stand apart by less than 0.5 % of these points' median distance, or are linked by such pairs.
+std::vector<std::vector<int>> ImagesOfOnePlace(const SfmModel& model);
+
+/// One line that names them; empty where there are none.
+std::string OnePlaceLine(const SfmModel& model);
+
+}  // namespace dtr::calib
