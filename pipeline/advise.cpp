@@ -36,10 +36,9 @@ std::vector<std::string> AdviceLines(const advise::Advice& advice) {
                   advice.places.size());
   if (!advice.add.empty()) {
     const advise::Place& place = advice.places[advice.add.front().place];
-    missing += fmt::format(
-        "; most is gained by a camera {}, where {:.0f} % of what it sees is in no photo and the "
-        "nearest photo within {:.0f} degrees",
-        place.where, 100 * place.unseen_share, place.gap_deg);
+    const std::string why = advise::WhyPoor(place, {});
+    missing += fmt::format("; most is gained by a camera {}{}{}", place.where,
+                           why.empty() ? "" : ": ", why);
   }
   std::string redundant = "coverage: every camera shows something of its own";
   if (!advice.redundant.empty()) {

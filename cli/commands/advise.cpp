@@ -57,18 +57,17 @@ std::string ToJson(const advise::Advice& advice, const DtrSet& set) {
   return json.dump(1);
 }
 
-void Say(const advise::Advice& advice, Console& console) {
+void Say(const advise::Advice& advice, const advise::AdviseOptions& options, Console& console) {
   const auto poor = std::count_if(advice.places.begin(), advice.places.end(),
                                   [](const auto& place) { return place.poor; });
   console.Say(fmt::format("looked from {} positions between and beyond the cameras: {} are poor",
                           advice.places.size(), poor));
   for (const auto& addition : advice.add) {
     const auto& place = advice.places[addition.place];
-    console.Say(fmt::format(
-        "  add a camera {}: {:.0f} % of what it sees is in no photo, nearest photo within {:.0f} "
-        "degrees; poor positions {} -> {}",
-        place.where, 100 * place.unseen_share, place.gap_deg, addition.poor_before,
-        addition.poor_after));
+    const std::string why = advise::WhyPoor(place, options);
+    console.Say(fmt::format("  add a camera {}{}{}; poor positions {} -> {}", place.where,
+                            why.empty() ? "" : ": ", why, addition.poor_before,
+                            addition.poor_after));
   }
   for (const auto& view : advice.redundant) {
     console.Say(fmt::format("  {} adds nothing: others show {:.1f} % of its points as well",
@@ -96,7 +95,7 @@ int Run(AdviseArguments options, const Context& context) {
                     options.set.string(), views.size()));
   }
   const advise::Advice advice = advise::Advise(views, options.advise, context.console);
-  Say(advice, context.console);
+  Say(advice, options.advise, context.console);
   if (!options.output.empty()) {
     const std::string name = WithoutTrailingSlash(options.set).filename().string();
     WriteFileAtomically(options.output, viewer::AdvicePage(name, set, advice, options.advise));

@@ -1,5 +1,8 @@
 #include "dtr/advise/advise.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <atomic>
 #include <stdexcept>
@@ -128,6 +131,19 @@ std::vector<std::string> NearestNames(std::span<const CoarseView> views,
 }
 
 }  // namespace
+
+std::string WhyPoor(const Place& place, const AdviseOptions& options) {
+  std::vector<std::string> reasons;
+  if (place.unseen_share > options.max_unseen) {
+    reasons.push_back(
+        fmt::format("{:.0f} % of what it sees is in no photo", 100 * place.unseen_share));
+  }
+  if (place.gap_deg > options.max_gap_deg) {
+    reasons.push_back(
+        fmt::format("what it sees is up to {:.0f} degrees from the nearest photo", place.gap_deg));
+  }
+  return fmt::format("{}", fmt::join(reasons, ", "));
+}
 
 Advice Advise(std::span<const CoarseView> views, const AdviseOptions& options, Progress& progress) {
   if (views.size() < 2) throw std::invalid_argument("Advise: fewer than 2 views");

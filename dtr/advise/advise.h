@@ -36,6 +36,10 @@ struct Place {
   bool poor = false;           ///< by AdviseOptions
 };
 
+/// What makes a place poor, in words: "12 % of what it sees is in no photo", "what it sees is up to
+/// 17 degrees from the nearest photo", or both; empty where it is not poor.
+std::string WhyPoor(const Place& place, const AdviseOptions& options);
+
 /// A camera that should be added: `place` index and how many poor places it leaves.
 struct Addition {
   size_t place = 0;

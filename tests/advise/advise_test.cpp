@@ -139,6 +139,21 @@ TEST(Advise, AsksForNoCameraBetweenTwoThatAddNothing) {
   EXPECT_THAT(advice.places[advice.add.front().place].where, HasSubstr("between"));
 }
 
+TEST(WhyPoor, NamesTheLimitsThatAPlaceMissesAndNoOther) {
+  Place place;
+  place.unseen_share = 0.01, place.gap_deg = 16.4;
+  EXPECT_EQ(WhyPoor(place, {}), "what it sees is up to 16 degrees from the nearest photo");
+  place.unseen_share = 0.12;
+  EXPECT_EQ(
+      WhyPoor(place, {}),
+      "12 % of what it sees is in no photo, what it sees is up to 16 degrees from the nearest "
+      "photo");
+  place.gap_deg = 3;
+  EXPECT_EQ(WhyPoor(place, {}), "12 % of what it sees is in no photo");
+  place.unseen_share = 0;
+  EXPECT_EQ(WhyPoor(place, {}), "");
+}
+
 TEST(Advise, IsTheSameForAnyNumberOfThreads) {
   const auto views = Row(Plane({0, 0, 1}, kWallZ), {0, 1, 2, 8, 9, 10});
   const Advice one = AdviseOn(views, {.threads = 1}), three = AdviseOn(views, {.threads = 3});
