@@ -92,21 +92,9 @@ TEST(ValidateBoards, TestViewsDoNotExcuseWhatTheKeptOnesContradict) {
 // out: that is no camera to rely on, however well it fits.
 TEST(ValidateBoards, TermsThatTheCornersLeaveOpenFailByName) {
   const auto terms_of = [](double outermost_px) {
-    Scene scene;
-    const LensCamera camera = TypicalCamera(BoardModel::kFisheye);
-    scene.cameras.push_back({"cam", BoardModel::kFisheye, camera, {}});
-    const auto exact = ExactViews(camera, 24, 9, 40);
-    scene.rig_from_board = exact.cam_from_board;
-    for (size_t frame = 0; frame < exact.views.size(); ++frame) {
-      BoardView view = exact.views[frame];
-      std::erase_if(view.corners, [&](const BoardCorner& corner) {
-        return (corner.pixel - Eigen::Vector2d(320, 240)).norm() > outermost_px;
-      });
-      if (view.corners.size() >= 9) scene.views.push_back({0, frame, std::move(view), {}});
-    }
-    const BoardValidation report =
-        ValidateBoards(CalibrationOf(SolveScene(scene, kCornerNoisePx, 1)), {}, {});
-    return TestOf(report, "undetermined_terms");
+    const Scene scene = MiddleOfFisheye(9, outermost_px);
+    return TestOf(ValidateBoards(CalibrationOf(SolveScene(scene, kCornerNoisePx, 1)), {}, {}),
+                  "undetermined_terms");
   };
   const Check all = terms_of(1000), middle = terms_of(130);
   EXPECT_TRUE(all.passed) << all.value << " " << all.reason;

@@ -41,12 +41,14 @@ enum class FaultInjection {
   kClusteredViews,
   kFrontoParallel,
   kPureRotation,
+  kZoomedViews,
+  kExtraFreedom,
 };
-inline constexpr int kFaultInjections = 14;
+inline constexpr int kFaultInjections = 16;
 
 /// A calibration to evaluate, and what should come of it.
 struct FaultInjectionCase {
-  std::string name, expected;  ///< the test that must break; "" for honest ones
+  std::string name, expected;  ///< the test that must break; "": any
   /// By which the test's figure is expected to exceed what noise makes of it, in its own sigmas;
   /// infinite for what is counted, not measured.
   double predicted_sigmas = std::numeric_limits<double>::infinity();
@@ -208,6 +210,36 @@ inline Scene Clustered(std::uint64_t seed) {
     near.views.push_back(std::move(view));
   }
   return near;
+}
+
+// A quarter of the views are zoomed.
+inline Scene Zoomed(std::uint64_t seed, double zoom) {
+  Scene scene = OneCamera(20, seed);
+  const std::vector<double>& params = scene.cameras[0].camera.params;
+  const Eigen::Vector2d centre(params[2], params[3]);
+  for (size_t i = 0; i < scene.views.size(); i += 4) {
+    for (BoardCorner& corner : scene.views[i].seen.corners) {
+      corner.pixel = centre + zoom * (corner.pixel - centre);
+    }
+  }
+  return scene;
+}
+
+// A fisheye's four coefficients, of corners in the middle of the image alone.
+inline Scene MiddleOfFisheye(std::uint64_t seed, double outermost_px) {
+  Scene scene;
+  const LensCamera camera = TypicalCamera(BoardModel::kFisheye);
+  scene.cameras.push_back({"cam", BoardModel::kFisheye, camera, {}});
+  const auto exact = ExactViews(camera, 24, seed, 40);
+  scene.rig_from_board = exact.cam_from_board;
+  for (size_t frame = 0; frame < exact.views.size(); ++frame) {
+    BoardView view = exact.views[frame];
+    std::erase_if(view.corners, [&](const BoardCorner& corner) {
+      return (corner.pixel - Eigen::Vector2d(320, 240)).norm() > outermost_px;
+    });
+    if (view.corners.size() >= 9) scene.views.push_back({0, frame, std::move(view), {}});
+  }
+  return scene;
 }
 
 inline void RollingShutter(std::uint64_t seed, Random& random, FaultInjectionCase& out) {
@@ -376,6 +408,15 @@ inline FaultInjectionCase Spoiled(FaultInjection kind, std::uint64_t seed) {
       out.expected = "min_tilt_deg";
       SolveOrNameIt(FlatBoards(seed, true), seed, out);
       break;
+    case FaultInjection::kZoomedViews:
+      out.name = "zoomed views";
+      SolveOrNameIt(Zoomed(seed, random.Uniform(1.01, 1.2)), seed, out);
+      break;
+    case FaultInjection::kExtraFreedom:
+      out.name = "terms that the corners leave open";
+      out.expected = "undetermined_terms";
+      SolveOrNameIt(MiddleOfFisheye(seed, random.Uniform(100, 140)), seed, out);
+      break;
   }
   return out;
 }
@@ -407,7 +448,8 @@ inline void ValidateFaultInjection(FaultInjection kind, std::uint64_t seed, Tall
   } else {
     const BoardValidation report = ValidateBoards(spoiled.calibration, {}, {});
     broken = BrokenTests(report.tests);
-    caught = BrokenTest(report.tests, spoiled.expected) != nullptr;
+    caught = spoiled.expected.empty() ? !report.passed()
+                                      : BrokenTest(report.tests, spoiled.expected) != nullptr;
   }
   ++(caught ? tally.caught : tally.missed);
   std::printf("%s: %s, %.1f predicted sigmas: %s\n", caught ? "caught" : "MISSED",
