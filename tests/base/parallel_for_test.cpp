@@ -2,8 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <atomic>
+#include <chrono>
+#include <mutex>
+#include <set>
 #include <stdexcept>
+#include <string>
+#include <thread>
 #include <vector>
 
 namespace dtr {
@@ -32,6 +40,111 @@ TEST(ParallelFor, RethrowsAnExceptionOfTheBody) {
                              }),
                  std::runtime_error);
   }
+}
+
+TEST(ParallelFor, TheExceptionIsThatOfTheFirstItemThatThrewHoweverLoopsNest) {
+  for (int run = 0; run < 20; ++run) {
+    try {
+      ParallelFor(0, 8, 4, [](int i) {
+        ParallelFor(0, 8, 4, [i](int j) {
+          if (j == 3) throw std::runtime_error(std::to_string(i));
+        });
+      });
+      FAIL() << "nothing was thrown";
+    } catch (const std::runtime_error& error) {
+      // Item 0 began before any other had ended, and it throws.
+      EXPECT_STREQ(error.what(), "0");
+    }
+  }
+}
+
+// Waits until `wanted` threads are here, for a while; whether they came.
+bool Meet(std::atomic<int>& here, int wanted) {
+  using Clock = std::chrono::steady_clock;
+  ++here;
+  for (const auto end = Clock::now() + std::chrono::seconds(20); Clock::now() < end;) {
+    if (here >= wanted) return true;
+    std::this_thread::yield();
+  }
+  return false;
+}
+
+TEST(ParallelFor, LoopsInsideALoopShareItsThreads) {
+  std::atomic<int> here{0}, met{0};
+  ParallelFor(0, 2, 6, [&](int) {
+    ParallelFor(0, 3, 6, [&](int) { met += Meet(here, 6); });  // six items, six threads
+  });
+  EXPECT_EQ(met, 6);
+}
+
+TEST(ParallelFor, NeverMoreThreadsAtOnceThanTheLargestRequest) {
+  std::atomic<int> running{0}, most{0};
+  for (int run = 0; run < 20; ++run) {
+    ParallelFor(0, 5, 3, [&](int) {
+      ParallelFor(0, 40, 3, [&](int) {
+        const int now = ++running;
+        for (int seen = most; seen < now && !most.compare_exchange_weak(seen, now);) {
+        }
+        std::this_thread::sleep_for(std::chrono::microseconds(50));
+        --running;
+      });
+    });
+  }
+  EXPECT_LE(most, 3);
+  EXPECT_GE(most, 2);
+}
+
+TEST(ParallelFor, LoopsOneAfterTheOtherUseTheSameThreads) {
+  std::mutex mutex;
+  std::set<pid_t> threads;
+  for (int run = 0; run < 200; ++run) {
+    ParallelFor(0, 8, 4, [&](int) {
+      const std::lock_guard lock(mutex);
+      threads.insert(gettid());
+    });
+  }
+  EXPECT_LE(threads.size(), 64U);  // other tests of this process started as many
+}
+
+TEST(ParallelFor, DeepNestsEnd) {
+  std::atomic<int> leaves{0};
+  ParallelFor(0, 4, 4, [&](int) {
+    ParallelFor(0, 4, 4, [&](int) {
+      ParallelFor(0, 4, 4, [&](int) { ParallelFor(0, 4, 4, [&](int) { ++leaves; }); });
+    });
+  });
+  EXPECT_EQ(leaves, 256);
+}
+
+TEST(ParallelFor, SeveralThreadsMayBeginLoopsAtOnce) {
+  std::atomic<int> items{0};
+  {
+    std::vector<std::jthread> callers;
+    for (int caller = 0; caller < 4; ++caller) {
+      callers.emplace_back([&] {
+        for (int run = 0; run < 50; ++run) ParallelFor(0, 20, 4, [&](int) { ++items; });
+      });
+    }
+  }
+  EXPECT_EQ(items, 4 * 50 * 20);
+}
+
+// As Python's multiprocessing does by default on Linux.
+TEST(ParallelFor, AForkedProcessHasThreadsOfItsOwn) {
+#ifdef __SANITIZE_THREAD__
+  GTEST_SKIP() << "ThreadSanitizer starts no threads after a fork";
+#endif
+  ParallelFor(0, 8, 4, [](int) {});
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    std::atomic<int> here{0}, met{0};
+    ParallelFor(0, 3, 3, [&](int) { met += Meet(here, 3); });
+    _exit(met == 3 ? 0 : 1);
+  }
+  int status = -1;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
 }
 
 TEST(ResolveThreads, PositiveIsKeptAndZeroMeansAllCores) {
