@@ -85,7 +85,7 @@ void LeaveOutWithoutParallax(const Bundle& bundle, const Normalised& n, double s
   std::vector<size_t> seen(n.poses.size()), kept(n.poses.size());
   std::vector<bool> unknown(tracks.size());
   for (size_t p = 0; p < tracks.size(); ++p) {
-    if (tracks[p].empty()) continue;
+    if (tracks[p].size() < 2) continue;
     const double rho = limits[tracks[p].front()];
     unknown[p] = rho > 0 && !(sigmas[p] < kUnknownShare * rho);
     for (const size_t image : tracks[p]) ++seen[image], kept[image] += !unknown[p];
