@@ -5,27 +5,24 @@
 #include <algorithm>
 
 #include "dtr/io/set_io.h"
+#include "pipeline/detail/run/side_by_side.h"
 
 namespace dtr::pipeline {
 
 std::vector<advise::CoarseView> CoarseViewsOf(const std::filesystem::path& folder,
-                                              const DtrSet& set, int threads, Progress& progress) {
+                                              const DtrSet& set, const Room& room,
+                                              Progress& progress) {
   const auto& views = set.frames.front().views;
-  progress.Stage("reading depth", static_cast<int>(views.size()));
-  std::vector<advise::CoarseView> coarse;
-  int done = 0;
-  for (const View& view : views) {
-    progress.ThrowIfInterrupted();
-    if (view.role == ViewRole::kSource && view.depth_file) {
-      View loaded = view;
-      io::LoadOptions load;
-      load.images = false;
-      load.threads = threads;
-      io::LoadPixels(folder, loaded, load);
-      coarse.push_back(advise::MakeCoarse(loaded, advise::kCoarseSidePx));
-    }
-    progress.Update(++done);
-  }
+  const std::vector<int> which = ViewsWithDepth(views);
+  std::vector<advise::CoarseView> coarse(which.size());
+  ForViews(views, which, "reading depth", room, progress, [&](size_t k) {
+    View loaded = views[static_cast<size_t>(which[k])];
+    io::LoadOptions load;
+    load.images = false;
+    load.threads = 1;  // views are side by side
+    io::LoadPixels(folder, loaded, load);
+    coarse[k] = advise::MakeCoarse(loaded, advise::kCoarseSidePx);
+  });
   return coarse;
 }
 

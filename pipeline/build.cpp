@@ -108,13 +108,13 @@ SetValidation Validate(const std::filesystem::path& folder, DtrSet& set, const S
 
 // Where the capture is thin, from the depth that was found. Kept out of set.json: it says nothing
 // that `dtr advise` would not find in the set.
-void AdviseOn(const std::filesystem::path& folder, DtrSet set, BuildReport& report, int threads,
-              Progress& progress) {
+void AdviseOn(const std::filesystem::path& folder, DtrSet set, BuildReport& report,
+              const Room& room, Progress& progress) {
   io::CollapseDuplicates(set);
-  const auto views = CoarseViewsOf(folder, set, threads, progress);
+  const auto views = CoarseViewsOf(folder, set, room, progress);
   if (views.size() < 2) return;
   advise::AdviseOptions options;
-  options.threads = threads;
+  options.threads = room.threads;
   report.coverage = AdviceLines(advise::Advise(views, options, progress));
 }
 
@@ -174,17 +174,16 @@ void ReportCalibration(const CalibratedPhotos& calibrated, const BuildInputs& in
 }
 
 // What depth that was found becomes in the set.
-void FinishDepth(const BuildOptions& options, const SparseScene& sparse, double memory_gb,
+void FinishDepth(const BuildOptions& options, const SparseScene& sparse, const Room& room,
                  io::SetWriter& writer, DtrSet& set, Progress& progress) {
-  FinishScene(set, SourcePoints(sparse, set.frames.front().views), writer, options.threads,
-              progress);
+  FinishScene(set, SourcePoints(sparse, set.frames.front().views), writer, room, progress);
   if (options.depth.depth_error_px) {
-    RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads, memory_gb, progress);
+    RecodeDepth(set, *options.depth.depth_error_px, writer, room, progress);
   }
   if (options.depth.completion) {
-    CompleteDepth(set, sparse, writer, options.threads, memory_gb, progress);
+    CompleteDepth(set, sparse, writer, room, progress);
   }
-  WriteMeshes(set, writer, options.threads, progress);
+  WriteMeshes(set, writer, room, progress);
 }
 
 // A process with a part of depth needs the images of all views.
@@ -246,8 +245,8 @@ BuildReport BuildOrPart(const BuildOptions& options, Progress& listener) {
   std::vector<View>& views = set.frames.front().views;
   RequireTwoSources(photos, held_out, calibrated);
   views = UndistortPhotos(photos, calibrated, held_out,
-                          {options.max_size_px, options.threads, share.Undistortion()}, writer,
-                          progress);
+                          {options.max_size_px, {options.threads, memory_gb}, share.Undistortion()},
+                          writer, progress);
   share.EndAfter("undistortion");
   if (share.is_shared()) RequireImages(views, writer);
   const SparseScene sparse = SparseOf(calibrated, views);
@@ -270,7 +269,8 @@ BuildReport BuildOrPart(const BuildOptions& options, Progress& listener) {
   report.prior = stage.prior;
 
   log.Begin("finishing");
-  FinishDepth(options, sparse, memory_gb, writer, set, progress);
+  const Room room{options.threads, memory_gb};
+  FinishDepth(options, sparse, room, writer, set, progress);
   set.provenance_json = ProvenanceJson(options, OptionsJson(options, stage.quality),
                                        PhotosJson(photos, is_source), calibrated, report)
                             .dump();
@@ -284,9 +284,9 @@ BuildReport BuildOrPart(const BuildOptions& options, Progress& listener) {
                 .skipped = report.skipped,
                 .not_registered = report.not_registered.size(),
                 .prior = report.prior,
-                .threads = options.threads},
+                .room = room},
                progress);
-  AdviseOn(writer.folder(), set, report, options.threads, progress);
+  AdviseOn(writer.folder(), set, report, room, progress);
   log.End();
   std::vector<std::string> lines = progress.lines();
   lines.insert(lines.end(), report.coverage.begin(), report.coverage.end());

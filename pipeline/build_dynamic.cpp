@@ -161,20 +161,21 @@ void FinishViews(const SparseScene& points, const BuildOptions& options, double 
                  std::optional<BackgroundViews> backgrounds, io::SetWriter& writer, DtrSet& set,
                  Progress& progress) {
   QuietProgress quiet(progress);
+  const Room room{options.threads, memory_gb};
   std::optional<StillCompletion> still_completed;
   if (options.depth.completion && backgrounds) {
-    still_completed.emplace(std::move(*backgrounds), points, set.frames.front().views, writer,
-                            options.threads, memory_gb, quiet);
+    still_completed.emplace(std::move(*backgrounds), points, set.frames.front().views, writer, room,
+                            quiet);
   }
   progress.Stage("finishing time steps", static_cast<int>(set.frames.size()));
   for (size_t step = 0; step < set.frames.size(); ++step) {
     DtrSet still = TakeStep(set, step);
     if (options.depth.depth_error_px) {
-      RecodeDepth(still, *options.depth.depth_error_px, writer, options.threads, memory_gb, quiet);
+      RecodeDepth(still, *options.depth.depth_error_px, writer, room, quiet);
     }
     if (options.depth.completion) {
       CompleteDepth(
-          still, points, writer, options.threads, memory_gb, quiet,
+          still, points, writer, room, quiet,
           still_completed ? still_completed->Of(still.frames.front().views) : KnownCompletion());
     }
     PutBack(std::move(still), step, set);
@@ -186,7 +187,7 @@ void FinishViews(const SparseScene& points, const BuildOptions& options, double 
   progress.Stage("meshes", static_cast<int>(set.frames.size()));
   for (size_t step = 0; step < set.frames.size(); ++step) {
     DtrSet still = TakeStep(set, step);
-    WriteMeshes(still, writer, options.threads, quiet);
+    WriteMeshes(still, writer, room, quiet);
     PutBack(std::move(still), step, set);
     progress.Update(static_cast<int>(step) + 1);
     progress.ThrowIfInterrupted();
@@ -282,7 +283,7 @@ BuildReport BuildDynamicSet(const BuildOptions& asked, const DynamicOptions& dyn
                 .skipped = {},
                 .not_registered = 0,
                 .prior = {},
-                .threads = options.threads},
+                .room = {options.threads, memory_gb}},
                progress);
   log.End();
   io::WriteRunRecord(writer.folder(), log.Record(ResolveThreads(options.threads), progress.lines()),

@@ -19,6 +19,7 @@
 #include "dtr/io/set_io.h"
 #include "dtr/render/stored_options.h"
 #include "dtr/render/stored_options_json.h"
+#include "pipeline/depth_settings.h"
 #include "pipeline/detail/boards/scale_board.h"
 #include "pipeline/detail/pages/set_page.h"
 #include "pipeline/detail/photos/panorama_positions.h"
@@ -266,7 +267,7 @@ ScaleReport ScaleSet(const ScaleOptions& options, Progress& progress) {
                             {"set_sha256", Sha256OfFile(options.set / "set.json")}};
   io::SetWriter writer(report.written, fingerprint.dump(), in_place || options.force);
   WriteViews(options, old_set, found.metric_from_scene.scale, set, writer, progress);
-  WriteMeshes(set, writer, options.threads, progress);
+  WriteMeshes(set, writer, {options.threads, kDefaultMemoryGb}, progress);
   std::vector<Check> checks;
   if (set.sparse_file) {
     SparseScene sparse = io::LoadSparse(options.set, old_set);
@@ -282,7 +283,7 @@ ScaleReport ScaleSet(const ScaleOptions& options, Progress& progress) {
                 .engine = {},
                 .checks = checks,
                 .skipped = {},
-                .threads = options.threads},
+                .room = {options.threads, kDefaultMemoryGb}},
                progress);
   log.End();
   // What the stages before cost is still what this set cost.

@@ -116,16 +116,15 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
     progress.Note("the record of what was pruned goes with the depth that was pruned");
     io::SetPrunedJson(set, "");
   }
-  FinishScene(set, {}, writer, options.threads, progress);
+  const Room room{options.threads, options.depth.memory_gb.value_or(kDefaultMemoryGb)};
+  FinishScene(set, {}, writer, room, progress);
   if (options.depth.depth_error_px) {
-    RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads,
-                options.depth.memory_gb.value_or(kDefaultMemoryGb), progress);
+    RecodeDepth(set, *options.depth.depth_error_px, writer, room, progress);
   }
   if (options.depth.completion) {
-    CompleteDepth(set, sparse, writer, options.threads,
-                  options.depth.memory_gb.value_or(kDefaultMemoryGb), progress);
+    CompleteDepth(set, sparse, writer, room, progress);
   }
-  const DepthCount count = WriteMeshes(set, writer, options.threads, progress);
+  const DepthCount count = WriteMeshes(set, writer, room, progress);
   writer.WriteSparse(set, sparse);
   nlohmann::ordered_json provenance = nlohmann::ordered_json::parse(set.provenance_json);
   provenance["depth_engine"] = options.depth.engine;
@@ -158,7 +157,7 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
                 .checks = validation.tests,
                 .skipped = {},
                 .prior = report.prior,
-                .threads = options.threads},
+                .room = room},
                progress);
   log.End();
   io::WriteRunRecord(writer.folder(),

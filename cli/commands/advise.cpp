@@ -12,6 +12,7 @@
 #include "dtr/io/set_io.h"
 #include "dtr/render/time_steps.h"
 #include "pipeline/advise.h"
+#include "pipeline/depth_settings.h"
 #include "viewer/advice_page.h"
 
 namespace dtr::cli {
@@ -86,8 +87,8 @@ int Run(AdviseArguments options, const Context& context) {
   DtrSet set = io::ReadSet(options.set);
   RequireOneFrame(set);
   io::CollapseDuplicates(set);
-  const auto views =
-      pipeline::CoarseViewsOf(options.set, set, context.common.threads, context.console);
+  const auto views = pipeline::CoarseViewsOf(
+      options.set, set, {context.common.threads, pipeline::kDefaultMemoryGb}, context.console);
   if (views.size() < 2) {
     throw Error(
         fmt::format("{}: expected at least 2 source views with depth, found {}; run dtr stereo "

@@ -97,6 +97,13 @@ void DepthSamples::Add(const View& view) {
   if (HasDepth(view)) AppendPoints(view, coordinates_);
 }
 
+void DepthSamples::Append(const DepthSamples& more) {
+  for (int axis = 0; axis < 3; ++axis) {
+    coordinates_[axis].insert(coordinates_[axis].end(), more.coordinates_[axis].begin(),
+                              more.coordinates_[axis].end());
+  }
+}
+
 SceneExtent DepthSamples::Extent() const {
   if (empty()) {
     throw Error(

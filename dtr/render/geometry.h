@@ -40,6 +40,7 @@ class DepthSamples {
  public:
   /// Adds the samples of a source view that has its depth loaded; passes over others.
   void Add(const View& view);
+  void Append(const DepthSamples& more);
   bool empty() const { return coordinates_[0].empty(); }
   /// Throws dtr::Error when there is no sample.
   SceneExtent Extent() const;

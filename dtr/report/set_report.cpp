@@ -53,9 +53,14 @@ void AddViews(HtmlReport& page, const std::vector<View>& views, const SetReportI
   for (const char* name : {"Name", "Role", "Pixels", "Focal length", "With depth", "Depth range"}) {
     header.emplace_back(name);
   }
-  std::vector<std::vector<Cell>> rows;
-  for (const View& view : views) {
-    rows.push_back(ViewRow(info.load ? info.load(view) : view, with_sigma, info.thumbnail_px));
+  std::vector<std::vector<Cell>> rows(views.size());
+  const auto row = [&](size_t i) {
+    rows[i] = ViewRow(info.load ? info.load(views[i]) : views[i], with_sigma, info.thumbnail_px);
+  };
+  if (info.for_rows) {
+    info.for_rows(rows.size(), row);
+  } else {
+    for (size_t i = 0; i < rows.size(); ++i) row(i);
   }
   page.Section("Views");
   page.Paragraph(std::string("Depth: closer is brighter, green is a hole.") +

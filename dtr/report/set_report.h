@@ -32,6 +32,8 @@ struct SetReportInfo {
   int thumbnail_px = 240;  ///< long side
   /// A view with its pixels, for sets that do not fit into memory; null: what the views have.
   std::function<View(const View&)> load;
+  /// Calls `row` for every number below `count`, from any thread; null: one after the other.
+  std::function<void(size_t count, const std::function<void(size_t)>& row)> for_rows;
 };
 
 /// Adds: facts, validation result and checks, the table of views (thumbnails of image, depth and

@@ -53,7 +53,7 @@ class UndistortPhotosTest : public ::testing::Test {
     io::SetWriter writer(folder_ / "set.dtr", "{}", false);
     std::vector<View> views =
         UndistortPhotos(photos_, calibrated_, std::vector<bool>(kPhotos, false),
-                        {.max_size_px = kMaxSizePx, .threads = 1}, writer, silent);
+                        {.max_size_px = kMaxSizePx, .room = {.threads = 1}}, writer, silent);
     for (View& view : views) {
       EXPECT_TRUE(view.image.empty()) << view.name;
       io::LoadPixels(writer.folder(), view, {});

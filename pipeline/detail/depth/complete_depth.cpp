@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "dtr/base/memory_budget.h"
-#include "dtr/base/parallel_for.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/scene.h"
 #include "dtr/types/inverse_depth_code.h"
@@ -81,21 +80,19 @@ DepthImage Completed(const stereo::CellView& cells, const stereo::CompletedCells
 }  // namespace
 
 std::vector<stereo::ScenePlane> CompleteDepth(DtrSet& set, const SparseScene& sparse,
-                                              io::SetWriter& writer, int threads, double memory_gb,
+                                              io::SetWriter& writer, const Room& room,
                                               Progress& progress, const KnownCompletion& known) {
   std::vector<View>& views = set.frames.front().views;
-  std::vector<int> sources;
+  const std::vector<int> sources = ViewsWithDepth(views);
   std::vector<PinholeCamera> cameras;
   double farthest = 0;
-  for (size_t i = 0; i < views.size(); ++i) {
-    const View& view = views[i];
-    if (view.role != ViewRole::kSource || !view.depth_file) continue;
-    sources.push_back(static_cast<int>(i));
+  for (const int source : sources) {
+    const View& view = views[static_cast<size_t>(source)];
     cameras.push_back(view.camera);
     farthest = std::max(farthest, view.far_z);
   }
-  const auto bytes = static_cast<double>(stereo::CompletionBytes(cameras, threads));
-  if (bytes > memory_gb * kBytesPerGigabyte) {
+  const auto bytes = static_cast<double>(stereo::CompletionBytes(cameras, room.threads));
+  if (bytes > room.memory_gb * kBytesPerGigabyte) {
     progress.Note(fmt::format(
         "depth is not completed where none was measured: that takes `memory` {:.3f} (GB)",
         bytes / kBytesPerGigabyte));
@@ -103,14 +100,12 @@ std::vector<stereo::ScenePlane> CompleteDepth(DtrSet& set, const SparseScene& sp
   }
   const auto far_z = static_cast<float>(kFarthest * farthest);
   std::vector<stereo::CellView> cells(sources.size());
-  const int count = static_cast<int>(sources.size());
-  ParallelFor(0, count, threads, [&](int i) {
-    progress.ThrowIfInterrupted();
-    const auto v = static_cast<size_t>(sources[static_cast<size_t>(i)]);
+  ForViews(views, sources, "", room, progress, [&](size_t k) {
+    const auto v = static_cast<size_t>(sources[k]);
     View view = Loaded(views[v], writer);
     // What is far is no surface that goes on.
     if (known.depth) Fill(known.depth(v, view), far_z, view);
-    cells[static_cast<size_t>(i)] = stereo::MakeCells(view);
+    cells[k] = stereo::MakeCells(view);
   });
   const bool measured = std::ranges::any_of(cells, [](const stereo::CellView& of_view) {
     return std::ranges::any_of(of_view.inverse_depth.data(), [](float w) { return w > 0; });
@@ -122,18 +117,14 @@ std::vector<stereo::ScenePlane> CompleteDepth(DtrSet& set, const SparseScene& sp
   const auto neighbours =
       NeighboursOf(views, sources, SourceScene(sparse, views, sources), kNeighbours);
   const std::vector<stereo::ScenePlane> planes =
-      known.depth ? known.planes : stereo::PlanesToChoose(cells, neighbours, threads);
-  const auto completed = stereo::CompleteCells(cells, neighbours, planes, threads, progress);
-  progress.Stage("completed depth", count);
-  for (int i = 0; i < count; ++i) {
-    progress.ThrowIfInterrupted();
-    const auto k = static_cast<size_t>(i);
+      known.depth ? known.planes : stereo::PlanesToChoose(cells, neighbours, room.threads);
+  const auto completed = stereo::CompleteCells(cells, neighbours, planes, room.threads, progress);
+  ForViews(views, sources, "completed depth", room, progress, [&](size_t k) {
     const auto v = static_cast<size_t>(sources[k]);
     const DepthImage depth =
         Completed(cells[k], completed[k], far_z, Loaded(views[v], writer), v, known, views[v]);
     writer.WriteCompleted(depth, views[v]);
-    progress.Update(i + 1);
-  }
+  });
   return planes;
 }
 

@@ -14,6 +14,7 @@
 #include "dtr/base/hash.h"
 #include "dtr/base/memory_budget.h"
 #include "dtr/io/depth_io.h"
+#include "pipeline/depth_settings.h"
 #include "pipeline/detail/depth/depth_engine.h"
 #include "pipeline/detail/depth/depth_precision.h"
 #include "pipeline/detail/depth/gains.h"
@@ -312,7 +313,10 @@ DepthStageResult DepthStage(DtrSet& set, const SparseScene& sparse, const DepthC
         });
   });
   if (options.part) throw PartDone();
-  if (options.gains) SetGains(set, scene, writer.folder(), options.threads, progress);
+  if (options.gains) {
+    const Room room{options.threads, choice.memory_gb.value_or(kDefaultMemoryGb)};
+    SetGains(set, scene, writer.folder(), room, progress);
+  }
   for (const int index : sources.indices) normals.Deliver(views[static_cast<size_t>(index)]);
   if (const std::string codings = SayDepthCodings(views); !codings.empty()) progress.Note(codings);
   DepthStageResult result{quality, std::nullopt, made_from};

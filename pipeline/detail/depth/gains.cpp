@@ -8,6 +8,7 @@
 #include "dtr/exposure/estimate_gains.h"
 #include "dtr/io/set_io.h"
 #include "pipeline/detail/depth/source_scene.h"
+#include "pipeline/detail/run/side_by_side.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -17,23 +18,23 @@ constexpr int kPartners = 8;
 }  // namespace
 
 void SetGains(DtrSet& set, const SparseScene& sources_scene, const std::filesystem::path& folder,
-              int threads, Progress& progress) {
+              const Room& room, Progress& progress) {
   std::vector<View>& views = set.frames.front().views;
   std::vector<int> sources;
   for (size_t i = 0; i < views.size(); ++i) {
     if (views[i].role == ViewRole::kSource) sources.push_back(static_cast<int>(i));
   }
-  std::vector<SmallView> small;
-  for (const int source : sources) {
-    View loaded = views[static_cast<size_t>(source)];
+  std::vector<SmallView> small(sources.size());
+  ForViews(views, sources, "", room, progress, [&](size_t k) {
+    View loaded = views[static_cast<size_t>(sources[k])];
     io::LoadOptions load;
     load.sigma = false;
-    load.threads = threads;
+    load.threads = 1;  // views are side by side
     io::LoadPixels(folder, loaded, load);
-    small.push_back(ShrinkForGains(loaded));
-  }
+    small[k] = ShrinkForGains(loaded);
+  });
   const auto partners = NeighboursOf(views, sources, sources_scene, kPartners);
-  const std::vector<Eigen::Vector3d> gains = EstimateGains(small, partners, threads);
+  const std::vector<Eigen::Vector3d> gains = EstimateGains(small, partners, room.threads);
   double most = 1;
   for (size_t i = 0; i < sources.size(); ++i) {
     views[static_cast<size_t>(sources[i])].gain = gains[i];

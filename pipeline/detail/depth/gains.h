@@ -5,13 +5,14 @@
 #include "dtr/base/progress.h"
 #include "dtr/types/dtr_set.h"
 #include "dtr/types/sparse_scene.h"
+#include "pipeline/room.h"
 
 namespace dtr::pipeline {
 
-/// Sets the gain of every source view (EstimateGains) from the pixels in `folder`, of which a
-/// view's are in memory at a time, and tells of gains that differ. `sources_scene`: the sparse
-/// points, with views as indices among the source views.
+/// Sets the gain of every source view (EstimateGains) from the pixels in `folder`, and tells of
+/// gains that differ. `sources_scene`: the sparse points, with views as indices among the source
+/// views.
 void SetGains(DtrSet& set, const SparseScene& sources_scene, const std::filesystem::path& folder,
-              int threads, Progress& progress);
+              const Room& room, Progress& progress);
 
 }  // namespace dtr::pipeline

@@ -13,6 +13,7 @@
 #include "dtr/base/memory_budget.h"
 #include "dtr/base/quiet_progress.h"
 #include "dtr/types/widen_bounds.h"
+#include "pipeline/depth_settings.h"
 #include "pipeline/detail/depth/depth_stage.h"
 #include "pipeline/detail/depth/plane_files.h"
 #include "pipeline/detail/depth/source_scene.h"
@@ -135,7 +136,8 @@ class TemporalDepth {
     stage.ranges = ranges_;
     const auto result = DepthStage(backgrounds_.set, scene_, options_.depth, options_.quality,
                                    stage, writer_, progress_);
-    FinishScene(backgrounds_.set, points_.points, writer_, options_.threads, progress_);
+    FinishScene(backgrounds_.set, points_.points, writer_,
+                {options_.threads, options_.depth.memory_gb.value_or(kDefaultMemoryGb)}, progress_);
     return result.planes_made_from;
   }
 
@@ -220,7 +222,8 @@ void FinishSteps(const SparseScene& points, const StepDepthOptions& options, io:
   Bounds bounds;
   for (const size_t step : SomeSteps(set.frames.size())) {
     DtrSet still = TakeStep(set, step);
-    FinishScene(still, points.points, writer, options.threads, quiet);
+    FinishScene(still, points.points, writer,
+                {options.threads, options.depth.memory_gb.value_or(kDefaultMemoryGb)}, quiet);
     Widen(still.bounds, bounds);
     if (!first) first = still;
     PutBack(std::move(still), step, set);

@@ -26,11 +26,11 @@ size_t PositionOf(size_t view, const std::vector<View>& views) {
 }  // namespace
 
 StillCompletion::StillCompletion(BackgroundViews backgrounds, const SparseScene& points,
-                                 const std::vector<View>& views, io::SetWriter& writer, int threads,
-                                 double memory_gb, Progress& progress)
+                                 const std::vector<View>& views, io::SetWriter& writer,
+                                 const Room& room, Progress& progress)
     : backgrounds_(std::move(backgrounds)), writer_(writer) {
   planes_ = CompleteDepth(backgrounds_.set, SourceScene(points, views, SourceIndices(views)),
-                          writer, threads, memory_gb, progress);
+                          writer, room, progress);
 }
 
 KnownCompletion StillCompletion::Of(const std::vector<View>& views) const {

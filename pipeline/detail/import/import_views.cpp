@@ -377,7 +377,7 @@ io::AlphaTotals WriteSet(const io::CameraList& list, const ImportOptions& option
   }
   if (options.completion && !options.depth_dir.empty()) {
     const double memory_gb = options.memory_gb > 0 ? options.memory_gb : kDefaultMemoryGb;
-    CompleteDepth(set, scene, writer, options.threads, memory_gb, progress);
+    CompleteDepth(set, scene, writer, {options.threads, memory_gb}, progress);
   }
   writer.Finish(set);
   return alpha;

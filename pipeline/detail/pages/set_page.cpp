@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <numeric>
+
 #include "dtr/base/files.h"
 #include "dtr/report/set_report.h"
+#include "pipeline/detail/run/side_by_side.h"
 
 namespace dtr::pipeline {
 
@@ -28,15 +31,16 @@ void WriteSetPage(const io::SetWriter& writer, const DtrSet& set, const SetPageF
     }
   }
   info.checks = facts.checks;
-  progress.Stage("page", static_cast<int>(views.size()));
-  int done = 0;
+  std::vector<int> all_views(views.size());
+  std::iota(all_views.begin(), all_views.end(), 0);
+  info.for_rows = [&](size_t, const std::function<void(size_t)>& row) {
+    ForViews(views, all_views, "page", facts.room, progress, row);
+  };
   info.load = [&](const View& view) {
-    progress.ThrowIfInterrupted();
-    progress.Update(++done);
     View loaded = view;
     io::LoadOptions load;
     load.sigma = true;
-    load.threads = facts.threads;
+    load.threads = 1;  // views are side by side
     io::LoadPixels(writer.folder(), loaded, load);
     return loaded;
   };

@@ -10,6 +10,7 @@
 #include "dtr/types/check.h"
 #include "dtr/types/dtr_set.h"
 #include "pipeline/depth_prior.h"
+#include "pipeline/room.h"
 
 namespace dtr::pipeline {
 
@@ -21,12 +22,12 @@ struct SetPageFacts {
   std::vector<std::pair<std::string, std::string>> skipped;  ///< file, reason
   size_t not_registered = 0;
   std::optional<DepthPriorReport> prior = {};
-  int threads = 0;
+  Room room = {};
 };
 
 /// Writes report/index.html into the writer's folder: source views only, as pixels of held-out
 /// photos stay in held_out/, and without times, so that equal builds stay equal. Pixels are read
-/// from there, one view at a time.
+/// from there, of as many views at a time as the room allows.
 void WriteSetPage(const io::SetWriter& writer, const DtrSet& set, const SetPageFacts& facts,
                   Progress& progress);
 

@@ -12,6 +12,7 @@
 #include "calib/undistort.h"
 #include "capture/ingest.h"
 #include "dtr/base/error.h"
+#include "pipeline/detail/run/side_by_side.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -56,6 +57,9 @@ void RequireSize(const capture::Photo& photo, const calib::LensCamera& lens) {
                   photo.name, lens.width_px, lens.height_px, photo.width_px, photo.height_px));
 }
 
+// Of a photo as it is decoded, drawn and coded again.
+constexpr double kBytesPerPixel = 24;
+
 }  // namespace
 
 std::vector<View> UndistortPhotos(const capture::Capture& capture,
@@ -71,40 +75,44 @@ std::vector<View> UndistortPhotos(const capture::Capture& capture,
                   [](const auto& camera) { return camera.second.IsUndistorted(); });
   if (undistorted) progress.Note("undistortion left out: no camera has distortion");
   const auto stabilised = StabilisedLenses(capture, held_out, model);
-  progress.Stage(undistorted ? "reading photos" : "undistorting",
-                 static_cast<int>(options.part.End(registered.size()) -
-                                  options.part.Begin(registered.size())));
-
   std::vector<View> views;
-  int done = 0;
+  std::vector<const capture::Photo*> photos;  // of the views
   for (size_t i = 0; i < capture.photos.size(); ++i) {
     const capture::Photo& photo = capture.photos[i];
     const auto found = registered.find(photo.name);
     if (found == registered.end()) continue;
-    progress.ThrowIfInterrupted();
     const calib::LensCamera& lens = model.cameras.at(found->second->camera_id);
     RequireSize(photo, lens);
-    const PinholeCamera onto = CameraToDrawOn(lens, stabilised);
     View view;
     view.id = photo.id;
     view.name = photo.name;
     view.role = held_out[i] ? ViewRole::kHeldOut : ViewRole::kSource;
-    view.camera = calib::ShrunkCamera(onto, options.max_size_px);
+    view.camera = calib::ShrunkCamera(CameraToDrawOn(lens, stabilised), options.max_size_px);
     view.cam_from_world = found->second->cam_from_world;
-    const bool is_ours = options.part.Has(views.size(), registered.size());
-    if (is_ours && !writer.RestoreView(view)) {
-      const capture::PhotoPixels pixels = capture::ReadPhotoAndMask(photo);
-      calib::UndistortedPhoto flat = calib::Undistort(pixels.image, pixels.mask, lens, onto,
-                                                      options.max_size_px, options.threads);
-      view.image = std::move(flat.image);
-      view.mask = std::move(flat.mask);
-      writer.WriteView(view, calibrated.unit);
-      view.image = {};
-      view.mask = {};
-    }
     views.push_back(std::move(view));
-    if (is_ours) progress.Update(++done);
+    photos.push_back(&photo);
   }
+  const size_t begin = options.part.Begin(views.size()), end = options.part.End(views.size());
+  const auto bytes = [&](size_t k) {
+    return kBytesPerPixel * photos[begin + k]->width_px * photos[begin + k]->height_px;
+  };
+  const auto draw = [&](size_t k) {
+    View& view = views[begin + k];
+    if (writer.RestoreView(view)) return;
+    const capture::Photo& photo = *photos[begin + k];
+    const calib::LensCamera& lens = model.cameras.at(registered.at(photo.name)->camera_id);
+    const capture::PhotoPixels pixels = capture::ReadPhotoAndMask(photo);
+    calib::UndistortedPhoto flat =
+        calib::Undistort(pixels.image, pixels.mask, lens, CameraToDrawOn(lens, stabilised),
+                         options.max_size_px, options.room.threads);
+    view.image = std::move(flat.image);
+    view.mask = std::move(flat.mask);
+    writer.WriteView(view, calibrated.unit);
+    view.image = {};
+    view.mask = {};
+  };
+  SideBySide(end - begin, undistorted ? "reading photos" : "undistorting", options.room, bytes,
+             progress, draw);
   return views;
 }
 

@@ -1,4 +1,4 @@
-// pipeline/detail/photos/undistort_photos.h -- photos become the images of views, one by one.
+// pipeline/detail/photos/undistort_photos.h -- photos become the images of views.
 #pragma once
 #include <vector>
 
@@ -8,17 +8,18 @@
 #include "dtr/io/set_io.h"
 #include "dtr/types/dtr_set.h"
 #include "pipeline/calibrate.h"
+#include "pipeline/room.h"
 
 namespace dtr::pipeline {
 
 struct UndistortOptions {
   int max_size_px = 0;  ///< long side of the images; 0: full size
-  int threads = 0;      ///< 0: all cores
-  Part part = {};       ///< of the views: the others are not written, and have no files
+  Room room = {};
+  Part part = {};  ///< of the views: the others are not written, and have no files
 };
 
 /// Views of the registered photos, in the photos' order, on the grid that calib::Undistort gives
-/// them; their pixels are written one by one and are not kept. A photo whose view an earlier,
+/// them; their pixels are written and not kept. A photo whose view an earlier,
 /// interrupted run wrote is not read again. `held_out`: for each photo. Throws Error for a photo
 /// that is not of its camera's size.
 std::vector<View> UndistortPhotos(const capture::Capture& capture,

@@ -8,8 +8,6 @@
 #include <vector>
 
 #include "dtr/base/error.h"
-#include "dtr/base/memory_budget.h"
-#include "dtr/base/parallel_for.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/render/adaptive_mesh.h"
 #include "dtr/render/geometry.h"
@@ -20,63 +18,39 @@ namespace dtr::pipeline {
 namespace {
 
 // A copy of the view with its stored depth and, if wanted, image and mask.
-View Loaded(const View& view, const io::SetWriter& writer, bool images, int threads,
-            bool completed = false) {
+View Loaded(const View& view, const io::SetWriter& writer, bool images, bool completed = false) {
   View loaded = view;
   io::LoadOptions load;
   load.images = images;
   load.completed = completed;
-  load.threads = threads;
+  load.threads = 1;  // views are side by side
   io::LoadPixels(writer.folder(), loaded, load);
   return loaded;
 }
 
-bool HasDepth(const View& view) { return view.role == ViewRole::kSource && view.depth_file; }
-
-// A stage over the views that have depth.
-class ViewsDone {
- public:
-  ViewsDone(const DtrSet& set, const std::string& stage, Progress& progress) : progress_(progress) {
-    const auto& views = set.frames.front().views;
-    progress.Stage(stage, static_cast<int>(std::count_if(views.begin(), views.end(), HasDepth)));
-  }
-  void OneMore() {
-    progress_.Update(++done_);
-    progress_.ThrowIfInterrupted();
-  }
-
- private:
-  Progress& progress_;
-  std::atomic<int> done_ = 0;
-};
-
 }  // namespace
 
 void FinishScene(DtrSet& set, std::span<const SparsePoint> points, const io::SetWriter& writer,
-                 int threads, Progress& progress) {
-  DepthSamples samples;
-  ViewsDone done(set, "extent of the scene", progress);
-  bool has_depth = false;
-  for (const View& view : set.frames.front().views) {
-    if (!HasDepth(view)) continue;
-    has_depth = true;
-    samples.Add(Loaded(view, writer, false, threads));
-    done.OneMore();
-  }
+                 const Room& room, Progress& progress) {
+  const std::vector<View>& views = set.frames.front().views;
+  const std::vector<int> which = ViewsWithDepth(views);
+  std::vector<DepthSamples> samples(which.size());
+  ForViews(views, which, "extent of the scene", room, progress, [&](size_t k) {
+    samples[k].Add(Loaded(views[static_cast<size_t>(which[k])], writer, false));
+  });
+  DepthSamples all;
+  for (const DepthSamples& of_view : samples) all.Append(of_view);
   FinishGeometry(set,
-                 has_depth || points.empty() ? samples.Extent() : SceneExtentFromPoints(points));
+                 !which.empty() || points.empty() ? all.Extent() : SceneExtentFromPoints(points));
 }
 
-void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, int threads, double memory_gb,
+void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, const Room& room,
                  Progress& progress) {
-  MemoryBudget memory(memory_gb);
-  ViewsDone done(set, "coding depth", progress);
   std::vector<View>& views = set.frames.front().views;
-  ParallelFor(0, static_cast<int>(views.size()), threads, [&](int i) {
-    View& view = views[static_cast<size_t>(i)];
-    if (!HasDepth(view)) return;
-    const auto share = memory.TakeForPhoto(view.camera.width_px(), view.camera.height_px());
-    View loaded = Loaded(view, writer, false, 1);
+  const std::vector<int> which = ViewsWithDepth(views);
+  ForViews(views, which, "coding depth", room, progress, [&](size_t k) {
+    View& view = views[static_cast<size_t>(which[k])];
+    View loaded = Loaded(view, writer, false);
     if (!io::TrySetDepthError(loaded, error_px * ThresholdsOf(loaded, {}).pixel)) {
       throw Error(fmt::format(
           "`depth_error` {}: {}: expected a bound that 16 bits can keep over its depths of {:.4g} "
@@ -88,24 +62,22 @@ void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, int thread
     view.depth_steps = loaded.depth_steps;
     view.depth_file = loaded.depth_file;
     view.mesh_file.reset();
-    done.OneMore();
   });
 }
 
-DepthCount WriteMeshes(DtrSet& set, io::SetWriter& writer, int threads, Progress& progress) {
-  DepthCount count;
-  ViewsDone done(set, "meshes", progress);
-  for (View& view : set.frames.front().views) {
-    if (!HasDepth(view)) continue;
-    const View loaded = Loaded(view, writer, true, threads, true);
-    writer.WriteMesh(view, MakeStoredMesh(loaded, RenderOptions{}, threads));
-    ++count.maps;
-    const DepthImage measured = MeasuredDepth(loaded);
-    for (const float z : measured.grid().data()) count.with_depth += !DepthImage::IsHole(z);
-    count.pixels += static_cast<long>(loaded.depth.grid().data().size());
-    done.OneMore();
-  }
-  return count;
+DepthCount WriteMeshes(DtrSet& set, io::SetWriter& writer, const Room& room, Progress& progress) {
+  std::vector<View>& views = set.frames.front().views;
+  const std::vector<int> which = ViewsWithDepth(views);
+  std::atomic<long> with_depth = 0, pixels = 0;
+  ForViews(views, which, "meshes", room, progress, [&](size_t k) {
+    View& view = views[static_cast<size_t>(which[k])];
+    const View loaded = Loaded(view, writer, true, true);
+    writer.WriteMesh(view, MakeStoredMesh(loaded, RenderOptions{}, room.threads));
+    const auto measured = MeasuredDepth(loaded).grid().data();
+    with_depth += std::ranges::count_if(measured, [](float z) { return !DepthImage::IsHole(z); });
+    pixels += static_cast<long>(measured.size());
+  });
+  return {static_cast<int>(which.size()), with_depth, pixels};
 }
 
 }  // namespace dtr::pipeline

@@ -1,6 +1,6 @@
 // pipeline/detail/run/finishing.h -- what is worked out once all depth maps lie in the set's
-// folder, one view in memory at a time. All of it tells of its views and can be stopped between
-// them.
+// folder, several views at a time where there is room. All of it tells of its views and can be
+// stopped between them.
 #pragma once
 #include <functional>
 #include <span>
@@ -9,19 +9,19 @@
 #include "dtr/io/set_io.h"
 #include "dtr/types/dtr_set.h"
 #include "dtr/types/sparse_scene.h"
+#include "pipeline/detail/run/side_by_side.h"
 #include "stereo/complete/scene_planes.h"
 
 namespace dtr::pipeline {
 
 /// Scene centre, bounds and baselines: from the stored depth maps or, without any, from `points`.
 void FinishScene(DtrSet& set, std::span<const SparsePoint> points, const io::SetWriter& writer,
-                 int threads, Progress& progress);
+                 const Room& room, Progress& progress);
 
 /// Stores the depth of every source view again as zstd-inverse, with 1/z off by at most `error_px`
 /// pixels of disparity from what the stereo engine gave. After FinishScene: pixels of disparity
-/// need the baselines. Maps in memory at a time take at most `memory_gb` (GB of 1e9 bytes). Throws
-/// Error where 16 bits cannot keep the bound.
-void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, int threads, double memory_gb,
+/// need the baselines. Throws Error where 16 bits cannot keep the bound.
+void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, const Room& room,
                  Progress& progress);
 
 /// Completed depth that is known before, of views of a set by their index.
@@ -38,11 +38,12 @@ struct KnownCompletion {
 
 /// Completes the depth of every source view (stereo/complete): what was not measured gets the
 /// depth of a surface or is far. After FinishScene: pixels of disparity need the baselines. Where
-/// `memory_gb` is too little, or nothing was measured at all, a note says so and depth stays as it
-/// is. `sparse`: views are indices into the set's. What is `known` stays as it is, and the rest is
-/// completed as if it had been measured. Returns the planes of the scene that cells chose among.
+/// the room's memory is too little, or nothing was measured at all, a note says so and depth stays
+/// as it is. `sparse`: views are indices into the set's. What is `known` stays as it is, and the
+/// rest is completed as if it had been measured. Returns the planes of the scene that cells chose
+/// among.
 std::vector<stereo::ScenePlane> CompleteDepth(DtrSet& set, const SparseScene& sparse,
-                                              io::SetWriter& writer, int threads, double memory_gb,
+                                              io::SetWriter& writer, const Room& room,
                                               Progress& progress,
                                               const KnownCompletion& known = {});
 
@@ -57,6 +58,6 @@ struct DepthCount {
 
 /// Writes the reduced mesh (SPEC 5.1) of every source view that has depth, as renderers make it
 /// with their default options. After FinishScene: thresholds need the baselines.
-DepthCount WriteMeshes(DtrSet& set, io::SetWriter& writer, int threads, Progress& progress);
+DepthCount WriteMeshes(DtrSet& set, io::SetWriter& writer, const Room& room, Progress& progress);
 
 }  // namespace dtr::pipeline

@@ -8,6 +8,7 @@
 #include "dtr/io/depth_io.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/scene.h"
+#include "pipeline/depth_settings.h"
 #include "pipeline/detail/run/finishing.h"
 #include "pipeline/detail/sweeps/set_quality.h"
 #include "pipeline/detail/sweeps/sweep_axes.h"
@@ -169,7 +170,7 @@ eval::SweepMeasurement StorageSweep::Measure(const eval::SweepSetting& setting) 
     }
     if (Value(setting, kMesh) == kKept && setting.at(kDepth) != 0) {
       NotesOnly notes(progress_);
-      WriteMeshes(set, writer, options_.threads, notes);
+      WriteMeshes(set, writer, {options_.threads, kDefaultMemoryGb}, notes);
     }
     // The calibration's points are no part of what is rendered from.
     set.sparse_file.reset();
