@@ -16,7 +16,7 @@
 #include "dtr/io/file_colours.h"
 #include "dtr/io/heif_exif.h"
 #include "dtr/io/heif_items.h"
-#include "dtr/io/jpeg_cmyk.h"
+#include "dtr/io/jpeg_pixels.h"
 #include "dtr/io/oiio_files.h"
 #include "dtr/io/photo_colours.h"
 #include "dtr/io/whole_images.h"
@@ -129,6 +129,24 @@ Grid<std::uint8_t> ReadColours(OIIO::ImageInput& in, const fs::path& file,
   return pixels;
 }
 
+bool IsOrdinaryJpeg(const OIIO::ImageInput& in) {
+  const int channels = in.spec().nchannels;
+  return std::string(in.format_name()) == "jpeg" && (channels == 1 || channels == 3);
+}
+
+// The same of a JPEG. `in` is closed, so that no image is held twice.
+Grid<std::uint8_t> ReadJpegColours(OIIO::ImageInput& in, const fs::path& file,
+                                   const PhotoColours& colours) {
+  in.close();
+  Grid<std::uint8_t> pixels = ReadJpegPixels(file);
+  if (!colours.converts()) return pixels;
+  std::vector<float> values(pixels.data().size());
+  std::transform(pixels.data().begin(), pixels.data().end(), values.begin(),
+                 [](std::uint8_t value) { return static_cast<float>(value) / 255; });
+  colours.Convert(values, pixels.channels(), pixels.data());
+  return pixels;
+}
+
 ImageRgb8 RgbFromGrey(const Grid<std::uint8_t>& grey) {
   ImageRgb8 rgb(grey.width(), grey.height(), 3);
   for (size_t i = 0; i < grey.data().size(); ++i) {
@@ -153,7 +171,6 @@ ImageSpec Spec8(int width, int height, int channels, Mark mark) {
 ImageSpec Rgb8Spec(const ImageRgb8& image, Mark mark = Mark::kNone) {
   return Spec8(image.width(), image.height(), 3, mark);
 }
-
 
 std::string EncodeJpeg(const ImageRgb8& image, int quality, ImageSpec spec) {
   spec.attribute("CompressionQuality", std::clamp(quality, 1, 100));
@@ -254,15 +271,14 @@ ImageAndMask ReadImageAndMask(const fs::path& file, const ImageReadOptions& opti
   const auto in = OpenImage(file, {options.limit_px, options.memory_gb}, options.raw_balance);
   const PhotoColours colours(in->spec(), in->format_name(), file);
   ExpectMemory(*in, file, ReadBytesOf(*in, file, colours.converts()), options.memory_gb);
-  std::optional<Grid<std::uint8_t>> plain;
-  if (IsCmyk(in->spec())) plain = ReadPlainCmykJpeg(file);
   const Alpha alpha(*in, file);
-  Grid<std::uint8_t> pixels = plain ? std::move(*plain) : ReadColours(*in, file, colours, alpha);
+  const int orientation = options.apply_exif_orientation ? ExifOrientationOf(SpecOf(*in, file)) : 1;
+  Grid<std::uint8_t> pixels = IsOrdinaryJpeg(*in) ? ReadJpegColours(*in, file, colours)
+                                                  : ReadColours(*in, file, colours, alpha);
   if (pixels.channels() == 1) pixels = RgbFromGrey(pixels);
   Mask mask = alpha.Usable();
   FillUnusable(pixels, mask);
   if (options.apply_exif_orientation) {
-    const int orientation = ExifOrientationOf(SpecOf(*in, file));
     pixels = ApplyExifOrientation(pixels, orientation);
     mask = ApplyExifOrientation(mask, orientation);
   }
@@ -273,6 +289,15 @@ Mask ReadMask(const fs::path& file, std::uint64_t limit_px, double memory_gb) {
   const auto in = OpenImage(file, {limit_px, memory_gb});
   ExpectMemory(*in, file, ReadBytesOf(*in, file, false), memory_gb);
   Mask mask(in->spec().width, in->spec().height);
+  if (IsOrdinaryJpeg(*in)) {
+    in->close();
+    const Grid<std::uint8_t> pixels = ReadJpegPixels(file);
+    ExpectSize(*in, file, pixels.width(), pixels.height());
+    const auto channels = static_cast<size_t>(pixels.channels());
+    for (size_t i = 0; i < mask.data().size(); ++i) mask.data()[i] = pixels.data()[channels * i];
+    for (std::uint8_t& value : mask.data()) value = value >= 128 ? 255 : 0;
+    return mask;
+  }
   ReadPixels(*in, file, 0, 1, TypeDesc::UINT8, mask.data().data());
   for (std::uint8_t& value : mask.data()) value = value >= 128 ? 255 : 0;
   if (AlphaChannelOf(in->spec()) > 0) {

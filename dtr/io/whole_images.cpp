@@ -151,9 +151,7 @@ std::optional<WholeImage> LookAtJpeg(const std::filesystem::path& path, FileByte
                 std::to_string(kMaxSegments) + " segments, found none; copy the file again");
   }
   if (!frame.progressive && frame.channels_in_scan >= frame.channels) return {};
-  const auto channels = static_cast<double>(frame.channels);
-  // Of inks they are held twice: for OpenImageIO's image, and for ours (jpeg_cmyk.cpp).
-  return WholeImage{frame.width, frame.height, kJpegBytes * channels * (channels == 4 ? 2 : 1),
+  return WholeImage{frame.width, frame.height, kJpegBytes * static_cast<double>(frame.channels),
                     "jpeg"};
 }
 

@@ -16,6 +16,7 @@
 #include "dtr/base/files.h"
 #include "dtr/base/random.h"
 #include "dtr/io/small_jpeg.h"
+#include "tests/support/message_of.h"
 #include "tests/support/photo_kinds.h"
 #include "tests/support/test_data.h"
 #include "tests/support/truncation.h"
@@ -253,6 +254,47 @@ TEST(ReadImage, ProgressiveJpegIsReadAsWell) {
   for (size_t i = 0; i < image.data().size(); ++i) {
     ASSERT_NEAR(read.data()[i], image.data()[i], 12) << i;
   }
+}
+
+// Photos that lost a part of their data: decoders go on with what follows, as other blocks in other
+// colours, and end before or behind the data's end.
+TEST(ReadImage, AJpegWithAHoleOrWithoutItsSecondHalfIsNoPhoto) {
+  const TemporaryFolder folder;
+  WriteImage(folder / "a.jpg", RandomImage(96, 64, 3), 90);
+  const std::string whole = ReadFile(folder / "a.jpg", 1 << 20);
+  const size_t size = whole.size();
+  const auto reason = [&](const std::string& bytes) {
+    WriteFileAtomically(folder / "b.jpg", bytes);
+    return testing::MessageOf<Error>([&] { ReadImage(folder / "b.jpg"); });
+  };
+  for (const size_t hole : {512, 1024, 2048}) {
+    std::string zeros = whole, lost = whole;
+    zeros.replace(size / 2, hole, hole, '\0');
+    lost.erase(size / 2, hole);
+    EXPECT_THAT(reason(zeros),
+                ::testing::HasSubstr("b.jpg: damaged image: expected a whole JPEG, found: "));
+    EXPECT_THAT(reason(lost), ::testing::HasSubstr(" data that end at row "));
+  }
+  std::string never_written = whole;
+  never_written.replace(size / 2, size - size / 2, size - size / 2, '\0');
+  EXPECT_THAT(reason(never_written), ::testing::HasSubstr("; copy the file again"));
+}
+
+// Webcams leave a few bytes behind the last row, some cameras fill up to a round size.
+TEST(ReadImage, WhatCamerasLeaveBehindTheLastRowOfAJpegDoesNoHarm) {
+  const TemporaryFolder folder;
+  WriteImage(folder / "a.jpg", SmoothImage(48, 32));
+  const ImageRgb8 image = ReadImage(folder / "a.jpg");
+  const std::string whole = ReadFile(folder / "a.jpg", 1 << 20);
+  for (const std::string& filling :
+       {std::string("\x12\x34"), std::string(3000, '\0'), std::string(70, '\x20')}) {
+    std::string bytes = whole;
+    bytes.insert(whole.size() - 2, filling);
+    WriteFileAtomically(folder / "b.jpg", bytes);
+    EXPECT_EQ(ReadImage(folder / "b.jpg"), image) << filling.size();
+  }
+  WriteFileAtomically(folder / "b.jpg", whole + "ftyp: a film behind the photo");
+  EXPECT_EQ(ReadImage(folder / "b.jpg"), image);
 }
 
 TEST(ReadImage, TurnsThePhotoUprightOnRequest) {
