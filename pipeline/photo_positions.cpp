@@ -93,11 +93,22 @@ PhotoPositions PhotoPositionsOf(const capture::Capture& capture,
 
 void RequirePlaces(const PhotoPositions& places, const std::string& where,
                    const std::string& whose) {
-  if (places.places.size() >= calib::kMinPositions) return;
+  if (places.places.size() < calib::kMinPositions) {
+    throw Error(
+        fmt::format("{}: expected at least {} photos of {} with latitude, longitude and altitude, "
+                    "found {}",
+                    where, calib::kMinPositions, whose, places.places.size()));
+  }
+  const auto same_place = [&](const io::GpsPosition& place) {
+    return place.latitude_deg == places.places.front().latitude_deg &&
+           place.longitude_deg == places.places.front().longitude_deg;
+  };
+  if (!std::all_of(places.places.begin(), places.places.end(), same_place)) return;
   throw Error(
-      fmt::format("{}: expected at least {} photos of {} with latitude, longitude and altitude, "
-                  "found {}",
-                  where, calib::kMinPositions, whose, places.places.size()));
+      fmt::format("{}: all {} photos of {} with GPS give the same latitude and longitude, as after "
+                  "a receiver that did not update or a program that cut digits off; leave `gps` "
+                  "out, or write the positions into the photos",
+                  where, places.places.size(), whose));
 }
 
 }  // namespace dtr::pipeline

@@ -197,6 +197,12 @@ TEST_F(BuildInMetres, WhatCannotBeHeldIsRejectedBeforeAnyWork) {
   ExpectRejected(Build({"--gps", "--holdout", "0000,0001,0002,0003", "--holdout-strict"}), kFailed,
                  "expected at least 4 photos of those not held out strictly with latitude, "
                  "longitude and altitude, found 3");
+  for (const CourtyardPhoto& photo : photos_) {
+    WritePhotoAt(folder_ / "photos" / photo.name, Eigen::Vector3d(25, 25, 0), {},
+                 io::ReadImage(folder_ / "plain" / photo.name));
+  }
+  ExpectRejected(Build({"--gps"}), kFailed,
+                 "all 7 photos of the folder with GPS give the same latitude and longitude");
   for (const CourtyardPhoto& photo : photos_) fs::remove(folder_ / "photos" / photo.name);
   fs::copy(folder_ / "plain", folder_ / "photos", fs::copy_options::recursive);
   ExpectRejected(Build({"--gps"}), kFailed,
