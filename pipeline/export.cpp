@@ -1,5 +1,11 @@
 #include "pipeline/export.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <set>
+
 #include "calib/colmap/export.h"
 #include "calib/colmap/model_io.h"
 #include "dtr/base/durable.h"
@@ -21,6 +27,33 @@ void ExportImages(const fs::path& folder, const DtrSet& set, const fs::path& tar
   }
 }
 
+// Readers of COLMAP's text files, COLMAP's own among them, end a name at a blank.
+void NameWithoutBlanks(std::vector<View>& views, Progress& progress) {
+  std::set<std::string> taken;
+  for (const View& view : views) taken.insert(view.name);
+  size_t renamed = 0;
+  for (View& view : views) {
+    const fs::path old = view.name;
+    std::string stem = (old.parent_path() / old.stem()).string();
+    std::string extension = old.extension().string();
+    for (std::string* text : {&stem, &extension}) {
+      std::replace_if(
+          text->begin(), text->end(), [](unsigned char c) { return std::isspace(c) != 0; }, '_');
+    }
+    if (stem + extension == view.name) continue;
+    std::string name = stem + extension;
+    for (int n = 2; !taken.insert(name).second; ++n)
+      name = fmt::format("{}-{}{}", stem, n, extension);
+    view.name = name;
+    ++renamed;
+  }
+  if (renamed == 0) return;
+  progress.Note(fmt::format(
+      "{} images get _ for the blanks in their names: readers of COLMAP's text files end a name at "
+      "a blank",
+      renamed));
+}
+
 }  // namespace
 
 ExportReport ExportColmap(const ExportRequest& request, Progress& progress) {
@@ -33,6 +66,7 @@ ExportReport ExportColmap(const ExportRequest& request, Progress& progress) {
   std::vector<View>& views = set.frames.front().views;
   const std::vector<std::string> names = ImageNames(views);
   for (size_t i = 0; i < views.size(); ++i) views[i].name = names[i];
+  if (request.text) NameWithoutBlanks(views, progress);
   const calib::SfmModel model = colmap::ModelFromViews(set, start.scene, [&](const View& view) {
     return ImageOf(request.set, view, request.threads);
   });

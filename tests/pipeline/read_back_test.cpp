@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 
 #include "dtr/base/files.h"
@@ -322,6 +323,32 @@ TEST_F(ReadBack, ColmapReadsItsFolder) {
     std::getline(image_lines, line);  // its observations
   }
   EXPECT_EQ(images, views_.size());
+}
+
+// Which COLMAP itself reads up to the first blank.
+TEST_F(ReadBack, NamesInColmapsTextFilesHaveNoBlanks) {
+  views_ = ExactViews({});
+  views_[0].name = "one two.png";
+  views_[1].name = "one_two.png";
+  WriteExactSet(folder_ / "set.dtr", views_, {});
+  pipeline::ExportRequest request = Request("colmap");
+  request.text = true;
+  pipeline::ExportColmap(request, noted_);
+  std::istringstream lines(ReadFile(folder_ / "colmap/sparse/0/images.txt", 1 << 26));
+  std::set<std::string> names;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.empty() || line[0] == '#') continue;
+    std::istringstream words(line);
+    std::string word, name;
+    for (int k = 0; k < 9; ++k) words >> word;
+    EXPECT_TRUE(words >> name);
+    EXPECT_FALSE(words >> word) << line;
+    EXPECT_TRUE(fs::exists(folder_ / "colmap/images" / name)) << name;
+    names.insert(name);
+    std::getline(lines, line);  // its observations
+  }
+  EXPECT_EQ(names.size(), views_.size());
+  EXPECT_TRUE(names.contains("one_two.png") && names.contains("one_two-2.png"));
 }
 
 TEST_F(ReadBack, OpenExrReadsDepth) {
