@@ -52,8 +52,9 @@ std::string LackOfParallax(const PairCounts& counts) {
   if (CameraStoodStill(counts)) {
     return fmt::format(
         "{} of {} matched pairs of photos show most of their common features at the same position "
-        "in both: the camera did not move against what stands still (a turntable, or a thing held "
-        "into the image); mask what stands still, by NAME_mask.png beside each NAME.jpg, black "
+        "in both: the camera did not move against what stands still (a turntable, a thing held "
+        "into the image, or text and frames drawn over it); mask what stands still, by "
+        "NAME_mask.png beside each NAME.jpg, black "
         "where the photo is not to be used; where nothing rotated, move the camera between photos",
         counts.still, counts.matched);
   }
@@ -65,6 +66,15 @@ std::string LackOfParallax(const PairCounts& counts) {
         counts.without_parallax, counts.matched);
   }
   return "";
+}
+
+std::string LackOfPairs(const PairCounts& counts) {
+  if (counts.matched + 1 >= counts.photos) return "";
+  return fmt::format(
+      "only {} pairs of the {} photos have features in common; photos that are dark, noisy, "
+      "blurred "
+      "or small have few: give sharp, well exposed ones, in full size, that overlap by half",
+      counts.matched, counts.photos);
 }
 
 std::string WhyNoModel(const PairCounts& counts) {

@@ -29,6 +29,10 @@ bool CameraStoodStill(const PairCounts& counts);
 /// `without_parallax`, with what helps; empty for others.
 std::string LackOfParallax(const PairCounts& counts);
 
+/// A sentence for counts with fewer matched pairs than a chain of all photos has, with what helps;
+/// empty for others.
+std::string LackOfPairs(const PairCounts& counts);
+
 /// Why the mapper made no model of these photos, and what helps.
 std::string WhyNoModel(const PairCounts& counts);
 

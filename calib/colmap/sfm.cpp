@@ -257,6 +257,9 @@ SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> imag
   try {
     const PairCounts pairs = CountPairs(workspace);
     result.report.lack_of_parallax = LackOfParallax(pairs);
+    if (result.report.lack_of_parallax.empty()) {
+      result.report.lack_of_parallax = LackOfPairs(pairs);
+    }
     // One homography explains most pairs of a wall or a box, too, of which there is a model: that
     // is worth a line where the model does not determine its cameras, not here.
     if (CameraStoodStill(pairs)) progress.Note(result.report.lack_of_parallax);
