@@ -6,6 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "calib/sfm/matching/overlay.h"
 #include "calib/sfm/matching/pair_choice.h"
 #include "calib/sfm/matching/pair_geometry.h"
 #include "calib/sfm/matching/pair_journal.h"
@@ -97,14 +98,15 @@ void CoarseSearch(std::span<const MatchPhoto> photos, const std::vector<std::pai
 
 // What became of the part's pairs along epipolar lines.
 void Verify(std::span<const MatchPhoto> photos, const std::vector<std::pair<int, int>>& pairs,
-            const std::vector<CoarsePair>& coarse, const ViewGraph& graph, const Part& part,
-            const MatchOptions& options, PairJournal& journal, Progress& progress,
+            const std::vector<CoarsePair>& coarse, const Overlay& overlay, const ViewGraph& graph,
+            const Part& part, const MatchOptions& options, PairJournal& journal, Progress& progress,
             std::vector<std::optional<TriedPair>>& tried) {
   PhotoCache<RayFeatures> features(
       photos.size(),
       [&](int i) {
         const MatchPhoto& photo = photos[static_cast<size_t>(i)];
-        return RaysOf(photo.features.keypoints, DescriptorsOf(photos, i, kAll, options),
+        return RaysOf(WithoutOverlay(overlay, i, photo.features.keypoints),
+                      DescriptorsOf(photos, i, kAll, options),
                       graph.cameras[static_cast<size_t>(photo.camera)]);
       },
       options.threads);
@@ -196,12 +198,15 @@ MatchResult MatchPhotos(std::span<const MatchPhoto> photos,
     CoarseSearch(photos, pairs, part, options, journal, progress, kept.coarse);
     if (options.part) throw PartDone();
   }
-  const std::vector<CoarsePair> coarse = AllOf(std::move(kept.coarse));
+  std::vector<CoarsePair> coarse = AllOf(std::move(kept.coarse));
+  const Overlay overlay = FindOverlay(photos, cameras, coarse);
+  RemoveOverlay(overlay, coarse);
+  if (!overlay.note.empty()) result.notes.push_back(overlay.note);
   for (size_t c = 0; c < options.lens_is_known.size(); ++c) {
     if (options.lens_is_known[c]) graph.focal_is_known[c] = true;
   }
   VoteOnCameras(photos, coarse, options, graph, result.notes);
-  Verify(photos, pairs, coarse, graph, part, options, journal, progress, kept.geometries);
+  Verify(photos, pairs, coarse, overlay, graph, part, options, journal, progress, kept.geometries);
   if (options.part) throw PartDone();
   for (auto& pair : kept.geometries) {
     if (pair->geometry) graph.pairs.push_back(std::move(*pair->geometry));

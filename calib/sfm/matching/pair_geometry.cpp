@@ -1,5 +1,6 @@
 #include "calib/sfm/matching/pair_geometry.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>

@@ -35,6 +35,53 @@ TEST(MatchPhotos, FindsRotationAndDirectionOfAllPairs) {
   }
 }
 
+// A watermark: features at the same pixels of every photo.
+void DrawOver(std::vector<MatchPhoto>& photos, int count) {
+  Random random(77);
+  const World looks = WorldOf(count, 78, false);
+  for (int i = 0; i < count; ++i) {
+    const auto x = static_cast<float>(random.Uniform(0, 1000));
+    const auto y = static_cast<float>(random.Uniform(0, 750));
+    for (MatchPhoto& photo : photos) {
+      photo.features.keypoints.push_back({x, y, 2, 0});
+      photo.features.descriptors.push_back(Near(looks.looks[static_cast<size_t>(i)], 0.05, random));
+    }
+  }
+}
+
+TEST(MatchPhotos, WhatIsDrawnOverEveryPhotoIsLeftOut) {
+  auto photos = Photos(WorldOf(500, 1, false), Camera(kFocalPx));
+  std::vector<size_t> of_scene;
+  for (const MatchPhoto& photo : photos) of_scene.push_back(photo.features.keypoints.size());
+  DrawOver(photos, 500);
+  const MatchResult result = Match(photos, Camera(kFocalPx), true);
+  ASSERT_EQ(result.notes.size(), 1u);
+  EXPECT_NE(result.notes[0].find("in 5 photos, are of features that keep their position"),
+            std::string::npos)
+      << result.notes[0];
+  ASSERT_EQ(result.graph.pairs.size(), 10u);
+  for (const PairGeometry& pair : result.graph.pairs) {
+    const auto a = static_cast<size_t>(pair.image_a), b = static_cast<size_t>(pair.image_b);
+    EXPECT_LT(RotationErrorDeg(pair, Places()[a], Places()[b]), 0.15);
+    for (const auto& [i, j] : pair.matches) {
+      EXPECT_LT(i, of_scene[a]);
+      EXPECT_LT(j, of_scene[b]);
+    }
+  }
+}
+
+TEST(MatchPhotos, TheSceneOfACameraThatStoodStillIsNotLeftOut) {
+  const World world = WorldOf(500, 1, false);
+  std::vector<MatchPhoto> photos;
+  for (std::uint64_t i = 0; i < 5; ++i) {
+    photos.push_back(Photo(world, Places()[i < 4 ? 0 : 1], Camera(kFocalPx), 10));
+  }
+  const MatchResult result = Match(photos, Camera(kFocalPx), true);
+  EXPECT_TRUE(result.notes.empty());
+  ASSERT_GE(result.graph.pairs.size(), 6u);
+  EXPECT_GT(result.graph.pairs[0].matches.size(), 100u);
+}
+
 TEST(MatchPhotos, VotesForFocalLengthAndDistortion) {
   for (const double k1 : {0.0, -0.2}) {
     const auto photos = Photos(WorldOf(600, 2, false), Camera(kFocalPx, k1));
