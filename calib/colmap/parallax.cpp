@@ -71,9 +71,9 @@ std::string LackOfParallax(const PairCounts& counts) {
 std::string LackOfPairs(const PairCounts& counts) {
   if (counts.matched + 1 >= counts.photos) return "";
   return fmt::format(
-      "only {} pairs of the {} photos have features in common; photos that are dark, noisy, "
-      "blurred "
-      "or small have few: give sharp, well exposed ones, in full size, that overlap by half",
+      "too few pairs of photos have features in common ({} among {} photos); photos that are dark, "
+      "noisy, blurred or small have few: give sharp, well exposed ones, in full size, that overlap "
+      "by half",
       counts.matched, counts.photos);
 }
 

@@ -218,8 +218,8 @@ TEST_F(RunSfmWithFake, AModelOfPhotosMostlyWithoutParallaxIsRemarkedOn) {
   fs::remove_all(workspace_ / "sfm");
   fake_.LeaveDatabase(Aliases(), {}, {{0, 1, 40}, {0, 2, 40}});
   EXPECT_THAT(Run().report.lack_of_parallax,
-              HasSubstr("only 2 pairs of the 4 photos have features in common; photos that are "
-                        "dark, noisy, blurred or small have few"));
+              HasSubstr("too few pairs of photos have features in common (2 among 4 photos); "
+                        "photos that are dark, noisy, blurred or small have few"));
 }
 
 // What the mapper does with free intrinsics; with fixed ones it makes its model.
