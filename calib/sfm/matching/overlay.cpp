@@ -88,9 +88,8 @@ Overlay FindOverlay(std::span<const MatchPhoto> photos, std::span<const calib::L
   if (share < kMinShare) return {};
   overlay.note = fmt::format(
       "{:.0f} % of the matches, in {} photos, are of features that keep their position in the "
-      "photo "
-      "while others move (text, a logo or a frame drawn over it, or what moves with the camera): "
-      "left out",
+      "photo while others move (text, a logo or a frame drawn over it, or what moves with the "
+      "camera): left out",
       100 * share, with_overlay);
   return overlay;
 }
