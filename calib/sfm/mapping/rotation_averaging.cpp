@@ -45,11 +45,14 @@ struct Directed {
   Matrix3d rotation, covariance;
 };
 Directed Forwards(const MatchedPose& pose) { return {pose.b_from_a, WithFloor(pose.covariance)}; }
-Directed From(const RelativeRotation& pair, int from) {
-  const Directed ab = Forwards(pair);
-  if (pair.image_a == from) return ab;
+Directed FromEnd(const MatchedPose& pose, bool from_a) {
+  const Directed ab = Forwards(pose);
+  if (from_a) return ab;
   // The inverse of exp(w) R is exp(-R^T w) R^T.
   return {ab.rotation.transpose(), ab.rotation.transpose() * ab.covariance * ab.rotation};
+}
+Directed From(const RelativeRotation& pair, int from) {
+  return FromEnd(pair, pair.image_a == from);
 }
 
 bool Closes(const Directed& ab, const Directed& bc, const Directed& ca) {
@@ -87,22 +90,134 @@ class Triplets {
     return legs;
   }
 
-  // How many of them close with a pose of the pair.
-  int ClosedBy(const MatchedPose& pose, size_t p,
-               const std::vector<std::pair<int, int>>& legs) const {
+  // Whether one of them closes with these poses of the pair and its legs.
+  bool IsClosed(size_t p, const std::pair<int, int>& legs, const MatchedPose& pose,
+                const MatchedPose& pose_a, const MatchedPose& pose_b) const {
     const int a = pairs_[p].image_a, b = pairs_[p].image_b;
-    int closed = 0;
-    for (const auto& [leg_a, leg_b] : legs) {
-      const RelativeRotation& ac = pairs_[leg_a];
-      const int c = ac.image_a == a ? ac.image_b : ac.image_a;
-      closed += Closes(Forwards(pose), From(pairs_[leg_b], b), From(ac, c)) ? 1 : 0;
-    }
-    return closed;
+    return Closes(Forwards(pose), FromEnd(pose_b, pairs_[legs.second].image_a == b),
+                  FromEnd(pose_a, pairs_[legs.first].image_a != a));
   }
 
  private:
   std::span<const RelativeRotation> pairs_;
   std::vector<std::vector<Edge>> edges_;
+};
+
+// Decides which of its two poses each pair takes, so that as many triplets close as can be.
+class TwinChoice {
+ public:
+  using Twins = std::vector<char>;  // per pair: whether it takes its twin
+
+  TwinChoice(int images, std::span<const RelativeRotation> pairs)
+      : pairs_(pairs), cycles_(pairs.size()) {
+    const Triplets triplets(images, pairs);
+    for (size_t p = 0; p < pairs.size(); ++p) {
+      for (const auto& legs : triplets.Of(p)) {
+        if (!pairs[p].twin && !pairs[legs.first].twin && !pairs[legs.second].twin) continue;
+        const unsigned closed = ClosingPoses(triplets, p, legs);
+        if (closed == 0) continue;
+        cycles_[p].push_back({legs.first, legs.second, closed});
+        ++closable_;
+      }
+    }
+  }
+
+  // Changes single pairs while more of their own triplets close by that.
+  Twins Improved(Twins twins) const {
+    constexpr int kPasses = 10;
+    bool changed = true;
+    for (int pass = 0; pass < kPasses && changed; ++pass) {
+      changed = false;
+      for (size_t p = 0; p < pairs_.size(); ++p) {
+        if (!pairs_[p].twin) continue;
+        const int before = ClosedOf(p, twins);
+        twins[p] ^= 1;
+        const bool more = ClosedOf(p, twins) > before;
+        if (!more) twins[p] ^= 1;
+        changed = changed || more;
+      }
+    }
+    return twins;
+  }
+
+  // Begins with both poses of each pair, the twin with weight `of_twin` and the pose with the rest
+  // of 1. A weight grows with the triplets that close with it, each times the weights of its other
+  // poses (the growth transform of Baum and Eagon 1967).
+  Twins Relaxed(double of_twin) const {
+    constexpr int kIterations = 30;
+    std::vector<double> weights, next;
+    for (const RelativeRotation& pair : pairs_) weights.push_back(pair.twin ? of_twin : 0);
+    for (int i = 0; i < kIterations; ++i) {
+      next = weights;
+      for (size_t p = 0; p < pairs_.size(); ++p) {
+        if (!pairs_[p].twin) continue;
+        const double pose = (1 - weights[p]) * ClosedOf(p, 0, weights);
+        const double twin = weights[p] * ClosedOf(p, 1, weights);
+        if (pose + twin > 0) next[p] = twin / (pose + twin);
+      }
+      std::swap(weights, next);
+    }
+    Twins twins;
+    for (const double weight : weights) twins.push_back(weight > 0.5 ? 1 : 0);
+    return twins;
+  }
+
+  // Triplets with twins that close, counted by each of their pairs; those that some poses close.
+  int Closed(const Twins& twins) const {
+    int closed = 0;
+    for (size_t p = 0; p < pairs_.size(); ++p) closed += ClosedOf(p, twins);
+    return closed;
+  }
+  int closable() const { return closable_; }
+
+ private:
+  // Bit k + 2 k_a + 4 k_b is set where the triplet closes with poses k of the pair, k_a and k_b of
+  // its legs; 0 is the pose, 1 the twin.
+  struct Cycle {
+    int leg_a = 0, leg_b = 0;
+    unsigned closed = 0;
+  };
+
+  unsigned ClosingPoses(const Triplets& triplets, size_t p, const std::pair<int, int>& legs) const {
+    const auto pose = [&](size_t pair, unsigned twin) -> const MatchedPose* {
+      const RelativeRotation& of = pairs_[pair];
+      return twin == 0 ? &of : of.twin ? &*of.twin : nullptr;
+    };
+    unsigned closed = 0;
+    for (unsigned k = 0; k < 8; ++k) {
+      const MatchedPose* of_pair = pose(p, k & 1u);
+      const MatchedPose* of_a = pose(static_cast<size_t>(legs.first), k >> 1 & 1u);
+      const MatchedPose* of_b = pose(static_cast<size_t>(legs.second), k >> 2);
+      if (of_pair == nullptr || of_a == nullptr || of_b == nullptr) continue;
+      if (triplets.IsClosed(p, legs, *of_pair, *of_a, *of_b)) closed |= 1u << k;
+    }
+    return closed;
+  }
+
+  int ClosedOf(size_t p, const Twins& twins) const {
+    unsigned closed = 0;
+    for (const Cycle& cycle : cycles_[p]) {
+      const int k = twins[p] + 2 * twins[cycle.leg_a] + 4 * twins[cycle.leg_b];
+      closed += cycle.closed >> k & 1u;
+    }
+    return static_cast<int>(closed);
+  }
+
+  double ClosedOf(size_t p, unsigned twin, const std::vector<double>& weights) const {
+    double closed = 0;
+    for (const Cycle& cycle : cycles_[p]) {
+      const double a = weights[cycle.leg_a], b = weights[cycle.leg_b];
+      for (unsigned k = twin; k < 8; k += 2) {
+        if ((cycle.closed >> k & 1u) == 0) continue;
+        closed += ((k & 2u) != 0 ? a : 1 - a) * ((k & 4u) != 0 ? b : 1 - b);
+      }
+    }
+    return closed;
+  }
+
+  std::span<const RelativeRotation> pairs_;
+  std::vector<std::vector<Cycle>> cycles_;
+  int closable_ = 0;
 };
 
 Vector3d ResidualOf(const RelativeRotation& pair, const std::vector<Matrix3d>& world) {
@@ -239,26 +354,27 @@ std::vector<double> TripletSupport(int images, std::span<const RelativeRotation>
   for (size_t p = 0; p < pairs.size(); ++p) {
     const auto legs = triplets.Of(p);
     if (legs.empty()) continue;
-    support[p] = static_cast<double>(triplets.ClosedBy(pairs[p], p, legs)) /
-                 static_cast<double>(legs.size());
+    const auto closed = std::count_if(legs.begin(), legs.end(), [&](const auto& of) {
+      return triplets.IsClosed(p, of, pairs[p], pairs[of.first], pairs[of.second]);
+    });
+    support[p] = static_cast<double>(closed) / static_cast<double>(legs.size());
   }
   return support;
 }
 
 void ChooseTwins(int images, std::vector<RelativeRotation>* pairs) {
-  constexpr int kPasses = 10;
-  const Triplets triplets(images, *pairs);  // sees what the pairs become
-  bool changed = true;
-  for (int pass = 0; pass < kPasses && changed; ++pass) {
-    changed = false;
-    for (size_t p = 0; p < pairs->size(); ++p) {
-      RelativeRotation& pair = (*pairs)[p];
-      if (!pair.twin) continue;
-      const auto legs = triplets.Of(p);
-      if (triplets.ClosedBy(*pair.twin, p, legs) <= triplets.ClosedBy(pair, p, legs)) continue;
-      pair.TakeTwin();
-      changed = true;
-    }
+  const TwinChoice choice(images, *pairs);
+  TwinChoice::Twins best = choice.Improved(TwinChoice::Twins(pairs->size()));
+  int closed = choice.Closed(best);
+  for (const double of_twin : {0.5, 0.3, 0.7}) {
+    if (closed == choice.closable()) break;
+    const TwinChoice::Twins twins = choice.Improved(choice.Relaxed(of_twin));
+    if (choice.Closed(twins) <= closed) continue;
+    best = twins;
+    closed = choice.Closed(twins);
+  }
+  for (size_t p = 0; p < pairs->size(); ++p) {
+    if (best[p] != 0) (*pairs)[p].TakeTwin();
   }
 }
 

@@ -18,8 +18,11 @@ inline constexpr double kRotationFloorRad = 0.02;
 /// looked at. Pairs without triplets have 0.5.
 std::vector<double> TripletSupport(int images, std::span<const RelativeRotation> pairs);
 
-/// Takes the twins with which more triplets close than with the pose (of as many the pose), until
-/// no pair changes. Right poses close their triplets, wrong ones those of the same mistake alone.
+/// Takes the poses with which the most triplets close. Right poses close their triplets, wrong ones
+/// those of the same mistake alone. Two kinds of search, of which the first with the most counts:
+/// from the poses as they are, a pair at a time; and of all pairs at once, from both poses
+/// (relaxation). Where all pairs that join two groups of images have the wrong pose, no single one
+/// of them closes more triplets.
 void ChooseTwins(int images, std::vector<RelativeRotation>* pairs);
 
 /// What a pose of images a and b disagrees by with rotations in one world, in standard deviations.

@@ -18,6 +18,7 @@ using testing::GraphOf;
 using testing::GraphSpec;
 using testing::LookAt;
 using testing::Scene;
+using testing::ScenePoint;
 using testing::Seen;
 
 // Positions to 0.5 % of the path and 0.1 degrees: noise of 0.4 px leaves about a tenth of that.
@@ -244,10 +245,44 @@ TEST(GlobalMapper, EqualFacadesAreNotFoldedIntoOne) {
   }
 }
 
+constexpr int kWallPoints = 500;
+constexpr double kWallZ = 8;
+
+Scene Wall() {
+  return {{testing::Lens()}, {}, {}, Box(kWallPoints, {-4, -3, kWallZ}, {4, 3, kWallZ})};
+}
+
+// Gives a pair the other pose that the wall leaves, the scene's first points; whether it is another
+// by 4 degrees and more.
+bool TakeOtherPoseOfWall(const Scene& scene, const Seen& seen, PairGeometry* pair) {
+  matching::PointPairs on_wall;
+  for (const auto& [a, b] : pair->matches) {
+    const int point_a = seen.shows[pair->image_a][a], point_b = seen.shows[pair->image_b][b];
+    if (point_a >= kWallPoints || point_b >= kWallPoints) continue;
+    const calib::LensCamera& lens = scene.lenses[0];
+    on_wall.Add(lens.RayFromPixel(seen.graph.images[pair->image_a].pixels[a])->hnormalized(),
+                lens.RayFromPixel(seen.graph.images[pair->image_b].pixels[b])->hnormalized());
+  }
+  const Pose& a_from_world = scene.cam_from_world[pair->image_a];
+  const Pose b_from_a = scene.cam_from_world[pair->image_b] * a_from_world.Inverse();
+  const Eigen::Matrix3d rotation = b_from_a.rotation.toRotationMatrix();
+  const Vector3d normal = a_from_world.rotation * Vector3d::UnitZ();
+  const double distance = kWallZ - a_from_world.TargetOriginInSource().z();
+  const auto both = matching::PosesOfPlane(
+      rotation + b_from_a.translation * normal.transpose() / distance, on_wall);
+  if (!both) return false;
+  const auto off = [&](const matching::RelativePose& pose) { return (pose.r - rotation).norm(); };
+  const auto& other = (*both)[off((*both)[0]) > off((*both)[1]) ? 0 : 1];
+  EXPECT_LT(std::min(off((*both)[0]), off((*both)[1])), 1e-6);
+  pair->b_rotation_a = other.r;
+  pair->b_translation_a = other.t;
+  return off(other) > 0.1;
+}
+
 // Photos of a wall with a few things before it: verification may take a pair for the other of the
 // two poses that the wall leaves.
 TEST(GlobalMapper, PairsWithTheOtherPoseOfTheirPlaneAreFound) {
-  Scene scene{{testing::Lens()}, {}, {}, Box(500, {-4, -3, 8}, {4, 3, 8})};
+  Scene scene = Wall();
   for (const auto& p : Box(40, {-2, -2, 6}, {2, 2, 7}, 9)) scene.points.push_back(p);
   for (int i = 0; i < 14; ++i) {
     const double x = 2.0 * (i % 5) - 4, y = 1.8 * (i / 5) - 2;
@@ -256,34 +291,45 @@ TEST(GlobalMapper, PairsWithTheOtherPoseOfTheirPlaneAreFound) {
   Seen seen = GraphOf(scene);
   int turned = 0;
   for (size_t k = 0; k < seen.graph.pairs.size(); ++k) {
-    PairGeometry& pair = seen.graph.pairs[k];
     if (k % 5 > 1) continue;
-    matching::PointPairs on_wall;
-    for (const auto& [a, b] : pair.matches) {
-      if (seen.shows[pair.image_a][a] >= 500 || seen.shows[pair.image_b][b] >= 500) continue;
-      on_wall.Add(
-          scene.lenses[0].RayFromPixel(seen.graph.images[pair.image_a].pixels[a])->hnormalized(),
-          scene.lenses[0].RayFromPixel(seen.graph.images[pair.image_b].pixels[b])->hnormalized());
-    }
-    const Pose& a_from_world = scene.cam_from_world[pair.image_a];
-    const Pose b_from_a = scene.cam_from_world[pair.image_b] * a_from_world.Inverse();
-    const Vector3d normal = a_from_world.rotation * Vector3d::UnitZ();
-    const double distance = 8 - a_from_world.TargetOriginInSource().z();
-    const auto both = matching::PosesOfPlane(
-        b_from_a.rotation.toRotationMatrix() + b_from_a.translation * normal.transpose() / distance,
-        on_wall);
-    ASSERT_TRUE(both);
-    const auto off = [&](const matching::RelativePose& pose) {
-      return (pose.r - b_from_a.rotation.toRotationMatrix()).norm();
-    };
-    const auto& other = (*both)[off((*both)[0]) > off((*both)[1]) ? 0 : 1];
-    ASSERT_LT(std::min(off((*both)[0]), off((*both)[1])), 1e-6);
-    pair.b_rotation_a = other.r;
-    pair.b_translation_a = other.t;
-    turned += off(other) > 0.1 ? 1 : 0;
+    turned += TakeOtherPoseOfWall(scene, seen, &seen.graph.pairs[k]) ? 1 : 0;
   }
   ASSERT_GT(4 * turned, static_cast<int>(seen.graph.pairs.size()));
   ExpectSolved(MapGlobally(seen.graph, {}), scene);
+}
+
+// What stands before a wall is seen from one side alone: all pairs of photos from the left and from
+// the right have the wall only, and no single one of them in its right pose agrees with others.
+TEST(GlobalMapper, AGroupOfPhotosThatSharesOnlyAPlaneIsJoinedByTheOtherPosesOfAllItsPairs) {
+  Scene scene = Wall();
+  for (const double side : {-1.0, 1.0}) {
+    for (ScenePoint p : Box(200, {-2, -2, 5.5}, {2, 2, 7.5}, side < 0 ? 9 : 10)) {
+      p.normal = Vector3d(side, 0, -0.2).normalized();
+      scene.points.push_back(p);
+    }
+  }
+  constexpr int kLeft = 8;
+  constexpr int kEvery = 10;  // point is found again from the other side
+  for (int i = 0; i < kLeft + 5; ++i) {
+    const double side = i < kLeft ? -1 : 1, y = 0.9 * (i % 3) - 1;
+    scene.cam_from_world.push_back(
+        LookAt({side * (2.5 + 0.5 * (i % kLeft)), y, 0.4 * (i % 4)}, {0.3 * side, 0.2 * y, 7.5}));
+  }
+  Seen seen = GraphOf(scene);
+  int across = 0, turned = 0;
+  for (PairGeometry& pair : seen.graph.pairs) {
+    if (pair.image_a >= kLeft || pair.image_b < kLeft) continue;
+    std::erase_if(pair.matches, [&](const auto& match) {
+      return seen.shows[pair.image_a][match.first] % kEvery != 0;
+    });
+    ++across;
+    turned += TakeOtherPoseOfWall(scene, seen, &pair) ? 1 : 0;
+  }
+  ASSERT_GE(across, 20);
+  ASSERT_EQ(turned, across);
+  const Mapped mapped = MapGlobally(seen.graph, {});
+  ExpectSolved(mapped, scene);
+  EXPECT_EQ(mapped.statistics.pairs_dropped, 0);
 }
 
 // A wallpaper whose pattern repeats: photos of one place match photos of another.

@@ -77,6 +77,46 @@ TEST(RotationAveraging, TripletsTellRightPairsFromWrongOnes) {
   }
 }
 
+// Two groups of images; every pair across has its wrong pose, and most have the right one as twin.
+TEST(ChooseTwins, PairsThatAreAllWrongAreChosenTogether) {
+  constexpr int kImages = 10, kFirstGroup = 6;
+  Random random(6);
+  Truth truth;
+  for (int i = 0; i < kImages; ++i) truth.world.push_back(ExpOf(RandomVector(&random)));
+  for (int a = 0; a < kImages; ++a) {
+    for (int b = a + 1; b < kImages; ++b) {
+      RelativeRotation pair{{}, static_cast<int>(truth.pairs.size()), a, b};
+      pair.covariance = 0.0035 * 0.0035 * Matrix3d::Identity();
+      pair.matches = 100;
+      const Matrix3d exact = truth.world[b] * truth.world[a].transpose();
+      const bool across = a < kFirstGroup && b >= kFirstGroup;
+      if (across || random.Uniform() < 0.3) {
+        MatchedPose& wrong = pair.twin.emplace(pair);
+        wrong.b_from_a = ExpOf(RandomVector(&random)) * exact;
+      }
+      pair.b_from_a = ExpOf(RandomVector(&random) * 0.0035) * exact;
+      if (across) {
+        pair.TakeTwin();
+        if (random.Uniform() < 0.2) pair.twin.reset();
+      }
+      truth.pairs.push_back(pair);
+    }
+  }
+  std::vector<RelativeRotation> chosen = truth.pairs;
+  ChooseTwins(kImages, &chosen);
+  int changed = 0;
+  for (size_t p = 0; p < chosen.size(); ++p) {
+    const RelativeRotation& pair = chosen[p];
+    const bool across = pair.image_a < kFirstGroup && pair.image_b >= kFirstGroup;
+    if (across && !pair.twin) continue;
+    const Matrix3d exact = truth.world[pair.image_b] * truth.world[pair.image_a].transpose();
+    EXPECT_LT(LogOf(pair.b_from_a * exact.transpose()).norm(), 0.02)
+        << pair.image_a << " " << pair.image_b;
+    changed += across ? 1 : 0;
+  }
+  EXPECT_GT(changed, 15);
+}
+
 // A small far object, where rotation and translation explain nearly the same, and a room.
 TEST(PairPoses, AnUncertainRotationSaysSo) {
   std::vector<double> traces;
