@@ -94,6 +94,32 @@ TEST(EstimateGains, HighlightsOfHalfTheWallChangeNothing) {
   for (size_t k = 0; k < with.size(); ++k) EXPECT_LT((with[k] - without[k]).norm(), 0.02);
 }
 
+// Of two photos of one exposure, a fifth and a quarter of the wall are brighter in the second, by
+// anything up to 60 %: highlights, and other surfaces where depth is wrong.
+TEST(EstimateGains, WhatIsBrighterFromOnePlaceAloneIsNoExposure) {
+  std::vector<View> views = Wall({{1, 1, 1}, {1, 1, 1}, {1, 1, 1}});
+  Random random(5);
+  const auto brighten = [&](View& view, int first, int end) {
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = first; x < end; ++x) {
+        const double by = 1 + 0.6 * random.Uniform();
+        for (int c = 0; c < 3; ++c) {
+          std::uint8_t& value = view.image(x, y, c);
+          value = Srgb8FromLinear(Exposed(LinearFromSrgb8()[value], by));
+        }
+      }
+    }
+  };
+  brighten(views[1], 0, 28);
+  brighten(views[2], 10, 38);
+  for (View& view : views) {  // and what a sensor adds
+    for (std::uint8_t& value : view.image.data()) {
+      value = static_cast<std::uint8_t>(std::clamp(value + random.Normal() * 2, 0.0, 255.0));
+    }
+  }
+  for (const auto& gain : GainsOf(views)) EXPECT_EQ(gain, Eigen::Vector3d::Ones());
+}
+
 TEST(EstimateGains, AViewWithoutAPartnerKeepsOne) {
   std::vector<View> views = Wall({{1.4, 1.4, 1.4}, {0.8, 0.8, 0.8}, {1.2, 1.2, 1.2}});
   views[2].depth = DepthImage(kWidth, kHeight);  // nothing measured
