@@ -43,6 +43,7 @@ calib::SfmModel ModelOf(const ViewGraph& graph, const MapCameras& cameras,
     index[i] = model.images.size();
     model.images.push_back(std::move(image));
   }
+  DropOutliers(graph, cameras, points);
   DropSharedFeatures(graph, points);
   for (size_t p = 0; p < points->size(); ++p) {
     const MapPoint& point = (*points)[p];

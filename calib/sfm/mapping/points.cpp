@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "calib/models/lens_formula.h"
+#include "dtr/base/order_statistics.h"
 #include "dtr/base/parallel_for.h"
 
 namespace dtr::sfm {
@@ -190,6 +191,29 @@ void FilterPoints(const ViewGraph& graph, const MapCameras& cameras, const Point
     return point.seen.size() < 2 ||
            LargestAngle(cameras, point.seen, point.p_in_world) < options.min_angle_rad;
   });
+}
+
+void DropOutliers(const ViewGraph& graph, const MapCameras& cameras,
+                  std::vector<MapPoint>* points) {
+  constexpr double kMedians = 4.25, kLeastPx = 1;
+  std::vector<std::vector<double>> errors(graph.images.size());
+  for (const MapPoint& point : *points) {
+    for (const TrackFeature& f : point.seen) {
+      errors[f.image].push_back(ReprojectionErrorPx(graph, cameras, f, point.p_in_world));
+    }
+  }
+  std::vector<double> limits_px;
+  for (size_t i = 0; i < errors.size(); ++i) {
+    const double least_px = LimitPx(kLeastPx, cameras.lenses[graph.images[i].camera]);
+    limits_px.push_back(errors[i].empty() ? least_px
+                                          : std::max(least_px, kMedians * UpperMedian(errors[i])));
+  }
+  for (MapPoint& point : *points) {
+    std::erase_if(point.seen, [&](const TrackFeature& f) {
+      return !(ReprojectionErrorPx(graph, cameras, f, point.p_in_world) <= limits_px[f.image]);
+    });
+  }
+  std::erase_if(*points, [](const MapPoint& point) { return point.seen.size() < 2; });
 }
 
 calib::Bundle BundleOfMap(const ViewGraph& graph, const MapCameras& cameras,

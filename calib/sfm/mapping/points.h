@@ -52,6 +52,11 @@ std::vector<MapPoint> PointsOf(const ViewGraph& graph, const MapCameras& cameras
 void FilterPoints(const ViewGraph& graph, const MapCameras& cameras, const PointOptions& options,
                   std::vector<MapPoint>* points);
 
+/// Takes away what stands out among its image's own errors: features beyond 4.25 times their median
+/// (5 standard deviations), and beyond 1 px of an image of 1000 px, then points with fewer than
+/// two. Of an image that stands wrong, whose errors are large as a whole, they stay.
+void DropOutliers(const ViewGraph& graph, const MapCameras& cameras, std::vector<MapPoint>* points);
+
 /// Largest angle in rad between the rays from the cameras of `seen` to a point.
 double LargestAngle(const MapCameras& cameras, const Track& seen,
                     const Eigen::Vector3d& p_in_world);
