@@ -3,7 +3,6 @@
 #include <pthread.h>
 
 #include <algorithm>
-#include <system_error>
 #include <thread>
 
 namespace dtr {
@@ -69,8 +68,8 @@ void ThreadPool::Run(Loop& loop) {
   std::unique_lock lock(mutex_);
   Loop& root = *loop.root_;
   root.most_running_ = std::max(root.most_running_, loop.most_running_);
-  StartThreads(root.most_running_ - 1);
   open_.push_back(&loop);
+  StartThreads();
   Wake(loop);
   lock.unlock();
   loop.RunItems();
@@ -80,12 +79,15 @@ void ThreadPool::Run(Loop& loop) {
   if (loop.first_error_) std::rethrow_exception(loop.first_error_);
 }
 
-// At most so many threads in all: the first one that the system rejects is the last one that is
-// asked for, this time.
-void ThreadPool::StartThreads(int count) {
+// As many as all loops may use that no other is around: a viewer that loads views beside its frames
+// has threads for both. The first one that the system rejects, for want of threads or of memory, is
+// the last one that is asked for, this time.
+void ThreadPool::StartThreads() {
+  int wanted = 0;
+  for (const Loop* loop : open_) wanted += loop->root_ == loop ? loop->most_running_ - 1 : 0;
   try {
-    for (; threads_ < count; ++threads_) std::thread([this] { Work(); }).detach();
-  } catch (const std::system_error&) {
+    for (; threads_ < wanted; ++threads_) std::thread([this] { Work(); }).detach();
+  } catch (const std::exception&) {
   }
 }
 

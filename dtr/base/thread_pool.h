@@ -61,7 +61,7 @@ class ThreadPool {
   void Run(Loop& loop);
 
  private:
-  void StartThreads(int count);
+  void StartThreads();
   void Work();
   void Enter(Loop& loop, std::unique_lock<std::mutex>& lock);
   void Await(Loop& loop, std::unique_lock<std::mutex>& lock);

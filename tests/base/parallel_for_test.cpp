@@ -116,6 +116,17 @@ TEST(ParallelFor, DeepNestsEnd) {
   EXPECT_EQ(leaves, 256);
 }
 
+TEST(ParallelFor, LoopsOfSeveralThreadsTakeNoThreadsFromEachOther) {
+  std::atomic<int> here{0}, met{0};
+  {
+    std::vector<std::jthread> callers;
+    for (int caller = 0; caller < 2; ++caller) {
+      callers.emplace_back([&] { ParallelFor(0, 2, 2, [&](int) { met += Meet(here, 4); }); });
+    }
+  }
+  EXPECT_EQ(met, 4);
+}
+
 TEST(ParallelFor, SeveralThreadsMayBeginLoopsAtOnce) {
   std::atomic<int> items{0};
   {
