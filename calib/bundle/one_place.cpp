@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <map>
-#include <numeric>
 #include <set>
 #include <utility>
 
@@ -15,6 +14,7 @@ namespace dtr::calib {
 namespace {
 
 constexpr double kSamePosition = 0.005;  // of the median distance of what both see
+constexpr double kNeighbour = 0.02;      // likewise: nearer ones have no position of their own
 constexpr size_t kMinShared = 10;        // points
 constexpr size_t kGroupsNamed = 3, kNamesOfGroup = 4;
 
@@ -74,28 +74,41 @@ Distances SharedDistances(const SfmModel& model) {
 }  // namespace
 
 std::vector<std::vector<int>> ImagesOfOnePlace(const SfmModel& model) {
-  std::vector<int> first(model.images.size());  // of an image's group
-  std::iota(first.begin(), first.end(), 0);
-  const auto root = [&](int image) {
-    while (first[static_cast<size_t>(image)] != image) image = first[static_cast<size_t>(image)];
-    return image;
-  };
   const auto centre = [&](int image) {
     return model.images[static_cast<size_t>(image)].cam_from_world.TargetOriginInSource();
   };
+  std::set<std::pair<int, int>> same, neighbours;
   for (auto& [pair, distances] : SharedDistances(model)) {
     if (distances.size() < kMinShared) continue;
-    const double apart = (centre(pair.first) - centre(pair.second)).norm();
-    if (!(apart < kSamePosition * UpperMedian(distances))) continue;
-    const int a = root(pair.first), b = root(pair.second);
-    first[static_cast<size_t>(std::max(a, b))] = std::min(a, b);
+    const double share = (centre(pair.first) - centre(pair.second)).norm() / UpperMedian(distances);
+    if (share < kSamePosition) {
+      same.insert(pair);
+    } else if (share < kNeighbour) {
+      neighbours.insert(pair);
+    }
   }
-  std::map<int, std::vector<int>> of_root;
-  for (int i = 0; i < static_cast<int>(first.size()); ++i) of_root[root(i)].push_back(i);
   std::vector<std::vector<int>> groups;
-  for (auto& [image, group] : of_root) {
-    if (group.size() > 1) groups.push_back(std::move(group));
+  for (int image = 0; image < static_cast<int>(model.images.size()); ++image) {
+    const auto group = std::find_if(groups.begin(), groups.end(), [&](const auto& others) {
+      return std::all_of(others.begin(), others.end(), [&](int other) {
+        return same.contains({other, image});
+      });
+    });
+    if (group == groups.end()) {
+      groups.push_back({image});
+    } else {
+      group->push_back(image);
+    }
   }
+  // The frames of a slow video follow each other, and share no position.
+  const auto in_a_row = [&](int image) {
+    return std::any_of(neighbours.begin(), neighbours.end(), [image](const auto& pair) {
+      return pair.first == image || pair.second == image;
+    });
+  };
+  std::erase_if(groups, [&](const std::vector<int>& group) {
+    return group.size() < 2 || std::any_of(group.begin(), group.end(), in_a_row);
+  });
   return groups;
 }
 
@@ -115,11 +128,9 @@ std::string OnePlaceLine(const SfmModel& model) {
         "{}{}", fmt::join(names, " + "),
         count > kNamesOfGroup ? fmt::format(" and {} more", count - kNamesOfGroup) : ""));
   }
-  return fmt::format(
-      "{} photos share {} position{} (exposure brackets, bursts): {}{}; points that they alone see "
-      "are left out",
-      photos, groups.size(), groups.size() == 1 ? "" : "s", fmt::join(named, "; "),
-      groups.size() > kGroupsNamed ? "; ..." : "");
+  return fmt::format("{} photos share {} position{} (exposure brackets, bursts): {}{}", photos,
+                     groups.size(), groups.size() == 1 ? "" : "s", fmt::join(named, "; "),
+                     groups.size() > kGroupsNamed ? "; ..." : "");
 }
 
 }  // namespace dtr::calib

@@ -8,7 +8,8 @@
 namespace dtr::calib {
 
 /// Groups of images (indices, rising) from one position: cameras that see points in common, and
-/// stand apart by less than 0.5 % of these points' median distance, or are linked by such pairs.
+/// stand apart by less than 0.5 % of these points' median distance, each from each, with no other
+/// image within 2 %.
 std::vector<std::vector<int>> ImagesOfOnePlace(const SfmModel& model);
 
 /// One line that names them; empty where there are none.

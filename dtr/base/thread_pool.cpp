@@ -25,12 +25,13 @@ Loop::Loop(int begin, int end, int limit, int request, const std::function<void(
       root_(parent != nullptr ? parent->root_ : this),
       next_(begin),
       first_error_item_(end),
-      most_running_(request) {}
+      max_running_(request) {}
 
-void Loop::RunItems() {
+void Loop::RunItems(bool by_caller) {
   Loop* const around = current_loop;
   current_loop = this;
   while (!failed_.load(std::memory_order_relaxed)) {
+    if (!by_caller && root_->running_ > root_->max_running_) break;
     const int i = next_.fetch_add(1, std::memory_order_relaxed);
     if (i >= end_) break;
     try {
@@ -67,12 +68,12 @@ Loop* ThreadPool::Current() { return current_loop; }
 void ThreadPool::Run(Loop& loop) {
   std::unique_lock lock(mutex_);
   Loop& root = *loop.root_;
-  root.most_running_ = std::max(root.most_running_, loop.most_running_);
+  root.max_running_ = std::max(root.max_running_.load(), loop.max_running_.load());
   open_.push_back(&loop);
   StartThreads();
   Wake(loop);
   lock.unlock();
-  loop.RunItems();
+  loop.RunItems(true);
   lock.lock();
   Await(loop, lock);
   lock.unlock();
@@ -84,7 +85,7 @@ void ThreadPool::Run(Loop& loop) {
 // the last one that is asked for, this time.
 void ThreadPool::StartThreads() {
   int wanted = 0;
-  for (const Loop* loop : open_) wanted += loop->root_ == loop ? loop->most_running_ - 1 : 0;
+  for (const Loop* loop : open_) wanted += loop->root_ == loop ? loop->max_running_ - 1 : 0;
   try {
     for (; threads_ < wanted; ++threads_) std::thread([this] { Work(); }).detach();
   } catch (const std::exception&) {
@@ -109,7 +110,7 @@ void ThreadPool::Work() {
 void ThreadPool::Enter(Loop& loop, std::unique_lock<std::mutex>& lock) {
   ++loop.inside_;
   lock.unlock();
-  loop.RunItems();
+  loop.RunItems(false);
   lock.lock();
   if (--loop.inside_ == 0 || loop.caller_waits_) loop.changed_.notify_one();
 }
@@ -140,7 +141,7 @@ Loop* ThreadPool::Joinable(const Loop* ancestor) {
     if (loop->inside_ >= loop->limit_ || loop->failed_ || loop->next_ >= loop->end_) continue;
     const Loop& root = *loop->root_;
     const bool allowed =
-        ancestor != nullptr ? loop->IsInside(ancestor) : root.running_ < root.most_running_;
+        ancestor != nullptr ? loop->IsInside(ancestor) : root.running_ < root.max_running_;
     if (allowed) return loop;
   }
   return nullptr;

@@ -22,7 +22,7 @@ class Loop {
  private:
   friend class ThreadPool;
 
-  void RunItems();
+  void RunItems(bool by_caller);
   bool IsInside(const Loop* ancestor) const;
 
   const int end_, limit_;
@@ -40,13 +40,15 @@ class Loop {
   int inside_ = 1;
   bool caller_waits_ = false;
   std::condition_variable changed_;  // for its caller, while that waits
-  int running_ = 1, most_running_;   // of a root: threads at work in it and in loops inside it
+  // Of a root: threads at work in it and in loops inside it, and how many may be.
+  std::atomic<int> running_ = 1, max_running_;
 };
 
 /// Threads that live as long as the process. A thread that is free enters the loop that began first
 /// among those with items left and a place free. A caller whose items are all taken, and who waits
 /// for others to finish theirs, enters loops inside its own meanwhile, and no other: so it returns
-/// as soon as its loop is done, its stack stays shallow, and no loop waits for itself.
+/// as soon as its loop is done, its stack stays shallow, and no loop waits for itself. Where
+/// another took its place meanwhile, one of those at work leaves after its item.
 ///
 /// After a fork the child has a pool of its own, without threads at first.
 class ThreadPool {

@@ -19,8 +19,9 @@ constexpr float kSameSurfacePx = 0.5;                   ///< of disparity, in li
 constexpr int kPatchPx = 8;                             ///< side of a patch, in little
 constexpr size_t kMinPixels = kPatchPx * kPatchPx / 2;  ///< that both views measured of a patch
 constexpr size_t kMinPatches = 5;                       ///< in common, for two views to be compared
-constexpr double kFullPatches = 25;  ///< from which on more of them count no more
-constexpr int kExposureSteps = 10;   ///< of Newton's method; 3 or 4 are enough
+constexpr double kFullPatches = 25;    ///< from which on more of them count no more
+constexpr int kExposureSteps = 30;     ///< of Newton's method; 3 or 4 are enough as a rule
+constexpr double kMaxLogExposure = 4;  ///< beyond which two photos show nothing in common
 
 // A patch's log exposure has the variance that its pixels leave, and that of: shading and depth;
 // the camera's black, by half an 8-bit value, in linear light; what is lost of it as it is black,
@@ -64,12 +65,15 @@ class PatchPixels {
   }
 
  private:
-  // By Newton's method: the exposure that makes the light of one patch that of the other.
+  // By Newton's method within bounds: the exposure that makes the light of one patch that of the
+  // other.
   double LogExposure(int c) const {
     double from_sum = 0, to_sum = 0;
     for (size_t i = 0; i < from_.size(); ++i) from_sum += from_[i][c], to_sum += to_[i][c];
     const auto count = static_cast<double>(from_.size());
     double log_exposure = std::log(ExposureBetween(from_sum / count, to_sum / count));
+    double low = -kMaxLogExposure, high = kMaxLogExposure;
+    if (!(low < log_exposure && log_exposure < high)) log_exposure = 0;
     for (int step = 0; step < kExposureSteps; ++step) {
       double sum = 0, slope = 0;
       for (const Array3d& from : from_) {
@@ -77,9 +81,12 @@ class PatchPixels {
         sum += light;
         slope += light * (1 - light * light * light * light);
       }
-      const double by = (to_sum - sum) / slope;
-      log_exposure += by;
-      if (std::abs(by) < kSettled) break;
+      (sum < to_sum ? low : high) = log_exposure;
+      double next = log_exposure + (to_sum - sum) / slope;
+      if (!(low < next && next < high)) next = 0.5 * (low + high);  // the curve is flat there
+      const bool settled = std::abs(next - log_exposure) < kSettled;
+      log_exposure = next;
+      if (settled) break;
     }
     return log_exposure;
   }

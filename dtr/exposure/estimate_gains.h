@@ -26,7 +26,7 @@ SmallView ShrinkForGains(const View& view);
 
 /// The gain of each view (View::gain): the exposure per channel that brings it to the mean of all,
 /// which is the mean of logarithms. Two views that measured a surface alike differ by the exposure
-/// that most pixels there agree on, of those between what the two show where that is neither black
+/// that most patches there agree on, of those between what the two show where that is neither black
 /// nor white; all pairs together are solved in logarithms under Cauchy's loss, damped, so that long
 /// chains of photos do not drift and views without a partner keep 1. `partners`: of each view,
 /// indices of others that show the same. All are exactly 1 where none is 2 % or more from it, since

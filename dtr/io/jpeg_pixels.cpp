@@ -56,6 +56,11 @@ bool IsFilling(std::FILE* file, const jpeg_source_mgr& source, long count) {
   return std::all_of(bytes.begin(), bytes.begin() + size, [&](char b) { return b == bytes[0]; });
 }
 
+// Whole photos of phones have odd headers (JWRN_NOT_SEQUENTIAL), which do no harm.
+bool SpoilsPixels(int code) {
+  return code == JWRN_HUFF_BAD_CODE || code == JWRN_ARITH_BAD_CODE || code == JWRN_MUST_RESYNC;
+}
+
 void Hear(j_common_ptr jpeg, int level) {
   Complaint& complaint = ComplaintOf(jpeg);
   if (level >= 0 || !complaint.in_pixels || complaint.words[0] != '\0') return;
@@ -70,7 +75,7 @@ void Hear(j_common_ptr jpeg, int level) {
   } else if (jpeg->err->msg_code == JWRN_JPEG_EOF || jpeg->err->msg_code == JWRN_HIT_MARKER) {
     std::snprintf(complaint.words, sizeof complaint.words, "data that end at row %u of %u", row,
                   rows);
-  } else {
+  } else if (SpoilsPixels(jpeg->err->msg_code)) {
     jpeg->err->format_message(jpeg, complaint.words);
   }
 }
@@ -123,13 +128,14 @@ Grid<std::uint8_t> ReadJpegPixels(const std::filesystem::path& file) {
   Complaint complaint;
   complaint.file = in.get();
   jpeg_decompress_struct jpeg{};
+  const std::unique_ptr<jpeg_decompress_struct, void (*)(j_decompress_ptr)> owned(
+      &jpeg, &jpeg_destroy_decompress);
   jpeg.err = jpeg_std_error(&complaint.manager);
   complaint.manager.error_exit = Jump;
   complaint.manager.emit_message = Hear;
   Grid<std::uint8_t> pixels;
   std::vector<JSAMPLE> inks;
   const bool decoded = Decode(in.get(), jpeg, complaint, pixels, inks);
-  jpeg_destroy_decompress(&jpeg);
   if (!decoded || complaint.words[0] != '\0') {
     throw Error(file.string() + ": damaged image: expected a whole JPEG, found: " +
                 complaint.words + "; copy the file again");

@@ -82,6 +82,22 @@ TEST(EstimateGains, WhatIsTwoPercentApartStaysAsItIs) {
   for (const auto& gain : gains) EXPECT_EQ(gain, Eigen::Vector3d::Ones());
 }
 
+// No exposure makes a patch that is half in the dark as bright as one that is all bright.
+TEST(EstimateGains, PatchesThatNoExposureExplainsChangeNothing) {
+  std::vector<View> views = Wall({{1.4, 1.4, 1.4}, {0.8, 0.8, 0.8}});
+  const auto without = GainsOf(views);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 16; x < 24; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        views[0].image(x, y, c) = x % 8 < 4 ? 40 : 243;
+        views[1].image(x - 6, y, c) = 243;
+      }
+    }
+  }
+  const auto with = GainsOf(views);
+  for (size_t k = 0; k < with.size(); ++k) EXPECT_LT((with[k] - without[k]).norm(), 0.02);
+}
+
 TEST(EstimateGains, HighlightsOfHalfTheWallChangeNothing) {
   std::vector<View> views = Wall({{1.4, 1.4, 1.4}, {0.8, 0.8, 0.8}});
   const auto without = GainsOf(views);

@@ -6,11 +6,14 @@
 #include <cmath>
 #include <limits>
 
+#include "dtr/base/order_statistics.h"
+
 namespace dtr::sfm::matching {
 namespace {
 
 constexpr double kStillShare = 0.0015;  // of the long side
-constexpr int kMinMoved = 30;           // matches of a pair that moved
+constexpr size_t kMinMoved = 30;        // matches of a pair that moved
+constexpr double kMovedShare = 0.05;    // of the long side, by at least half of them
 constexpr int kMinPairs = 3;            // in which a feature did not move
 constexpr double kMinShare = 0.05;      // of all matches
 
@@ -30,25 +33,33 @@ class SameSize {
     const calib::LensCamera& first = cameras[static_cast<size_t>(a_.camera)];
     const calib::LensCamera& second = cameras[static_cast<size_t>(b_.camera)];
     if (first.width_px != second.width_px || first.height_px != second.height_px) return;
-    limit_px_ = kStillShare * std::max(first.width_px, first.height_px);
+    long_side_px_ = std::max(first.width_px, first.height_px);
   }
-  explicit operator bool() const { return limit_px_ > 0; }
   bool IsStill(const CoarseMatch& match) const {
-    const Keypoint& p = a_.features.keypoints[static_cast<size_t>(match.a)];
-    const Keypoint& q = b_.features.keypoints[static_cast<size_t>(match.b)];
-    return std::hypot(p.x_px - q.x_px, p.y_px - q.y_px) < limit_px_;
+    return DisplacementPx(match) < kStillShare * long_side_px_;
+  }
+  // Whether enough of the scene moved far enough: what is far away moves little, too.
+  bool SomethingMoved(const std::vector<CoarseMatch>& matches) const {
+    if (long_side_px_ == 0) return false;
+    std::vector<double> moved_px;
+    for (const CoarseMatch& match : matches) {
+      if (!IsStill(match)) moved_px.push_back(DisplacementPx(match));
+    }
+    return moved_px.size() >= kMinMoved && 4 * moved_px.size() >= matches.size() &&
+           UpperMedian(moved_px) >= kMovedShare * long_side_px_;
   }
 
  private:
+  double DisplacementPx(const CoarseMatch& match) const {
+    const Keypoint& p = a_.features.keypoints[static_cast<size_t>(match.a)];
+    const Keypoint& q = b_.features.keypoints[static_cast<size_t>(match.b)];
+    return std::hypot(p.x_px - q.x_px, p.y_px - q.y_px);
+  }
+
   const MatchPhoto& a_;
   const MatchPhoto& b_;
-  double limit_px_ = 0;
+  int long_side_px_ = 0;  // 0: of two sizes
 };
-
-bool SomethingMoved(size_t still, size_t matches) {
-  const size_t moved = matches - still;
-  return moved >= kMinMoved && 4 * moved >= matches;
-}
 
 }  // namespace
 
@@ -59,11 +70,7 @@ Overlay FindOverlay(std::span<const MatchPhoto> photos, std::span<const calib::L
   size_t matches = 0;
   for (const CoarsePair& pair : pairs) {
     const SameSize photos_of(photos, cameras, pair);
-    if (!photos_of) continue;
-    const auto still = static_cast<size_t>(
-        std::count_if(pair.matches.begin(), pair.matches.end(),
-                      [&](const CoarseMatch& match) { return photos_of.IsStill(match); }));
-    if (!SomethingMoved(still, pair.matches.size())) continue;
+    if (!photos_of.SomethingMoved(pair.matches)) continue;
     matches += pair.matches.size();
     for (const CoarseMatch& match : pair.matches) {
       Counts& a = tally[static_cast<size_t>(pair.a)][static_cast<size_t>(match.a)];

@@ -18,7 +18,8 @@ struct Overlay {
 
 /// A feature is taken for one where its matches lie at the same position (0.15 % of the long side)
 /// in 3 pairs or more, and moved in a third as many at most. Pairs count in which a quarter of the
-/// matches or more moved: where a camera stood still, its photos' scene does, too. Where fewer than
+/// matches or more moved, half of those by 5 % of the long side: where a camera hardly moved, the
+/// scene of its photos does not, either. Where fewer than
 /// 5 % of the matches are of such features, outlier tests deal with them, and none is named.
 Overlay FindOverlay(std::span<const MatchPhoto> photos, std::span<const calib::LensCamera> cameras,
                     std::span<const CoarsePair> pairs);

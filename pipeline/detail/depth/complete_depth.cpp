@@ -19,8 +19,9 @@ namespace dtr::pipeline {
 namespace {
 
 constexpr int kNeighbours = 8;
-constexpr double kFarthest = 50;  // times the farthest measured depth: drawn behind everything
-constexpr double kStepPx = 0.5;   // pixels of disparity between depths that are stored
+constexpr double kFarthest = 50;       // times the farthest measured depth: drawn behind everything
+constexpr double kStepPx = 0.5;        // pixels of disparity between depths that are stored
+constexpr double kLeastRoomGb = 0.01;  // a view at a time
 
 View Loaded(const View& view, const io::SetWriter& writer) {
   View loaded = view;
@@ -99,8 +100,11 @@ std::vector<stereo::ScenePlane> CompleteDepth(DtrSet& set, const SparseScene& sp
     return {};
   }
   const auto far_z = static_cast<float>(kFarthest * farthest);
+  // Beside the cells, which stay until the end.
+  const Room beside{room.threads,
+                    std::max(room.memory_gb - bytes / kBytesPerGigabyte, kLeastRoomGb)};
   std::vector<stereo::CellView> cells(sources.size());
-  ForViews(views, sources, "", room, progress, [&](size_t k) {
+  ForViews(views, sources, "", beside, progress, [&](size_t k) {
     const auto v = static_cast<size_t>(sources[k]);
     View view = Loaded(views[v], writer);
     // What is far is no surface that goes on.
@@ -119,7 +123,7 @@ std::vector<stereo::ScenePlane> CompleteDepth(DtrSet& set, const SparseScene& sp
   const std::vector<stereo::ScenePlane> planes =
       known.depth ? known.planes : stereo::PlanesToChoose(cells, neighbours, room.threads);
   const auto completed = stereo::CompleteCells(cells, neighbours, planes, room.threads, progress);
-  ForViews(views, sources, "completed depth", room, progress, [&](size_t k) {
+  ForViews(views, sources, "completed depth", beside, progress, [&](size_t k) {
     const auto v = static_cast<size_t>(sources[k]);
     const DepthImage depth =
         Completed(cells[k], completed[k], far_z, Loaded(views[v], writer), v, known, views[v]);

@@ -57,7 +57,7 @@ void RequireSize(const capture::Photo& photo, const calib::LensCamera& lens) {
                   photo.name, lens.width_px, lens.height_px, photo.width_px, photo.height_px));
 }
 
-// Of a photo as it is decoded, drawn and coded again.
+// For a photo while it is decoded, drawn and coded again.
 constexpr double kBytesPerPixel = 24;
 
 }  // namespace
@@ -94,7 +94,8 @@ std::vector<View> UndistortPhotos(const capture::Capture& capture,
   }
   const size_t begin = options.part.Begin(views.size()), end = options.part.End(views.size());
   const auto bytes = [&](size_t k) {
-    return kBytesPerPixel * photos[begin + k]->width_px * photos[begin + k]->height_px;
+    const capture::Photo& photo = *photos[begin + k];
+    return std::max(capture::MemoryOf(photo), kBytesPerPixel * photo.width_px * photo.height_px);
   };
   const auto draw = [&](size_t k) {
     View& view = views[begin + k];

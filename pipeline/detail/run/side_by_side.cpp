@@ -1,6 +1,7 @@
 #include "pipeline/detail/run/side_by_side.h"
 
-#include <atomic>
+#include <algorithm>
+#include <mutex>
 
 #include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
@@ -8,7 +9,7 @@
 namespace dtr::pipeline {
 namespace {
 
-// Of a view with image, mask, depth, completed depth and standard deviation, and what is made of
+// For a view with image, mask, depth, completed depth and standard deviation, and what is made of
 // them while it is looked at.
 constexpr double kBytesPerPixel = 64;
 constexpr double kShareOfMemory = 0.5;  // the rest is what the program holds besides
@@ -29,13 +30,22 @@ void SideBySide(size_t count, const std::string& stage, const Room& room,
                 const std::function<double(size_t k)>& bytes, Progress& progress,
                 const std::function<void(size_t k)>& body) {
   if (!stage.empty()) progress.Stage(stage, static_cast<int>(count));
-  MemoryBudget memory(kShareOfMemory * room.memory_gb);
-  std::atomic<int> done = 0;
-  ParallelFor(0, static_cast<int>(count), room.threads, [&](int k) {
+  const double room_bytes = kShareOfMemory * room.memory_gb * kBytesPerGigabyte;
+  double largest_bytes = 1;
+  for (size_t k = 0; k < count; ++k) largest_bytes = std::max(largest_bytes, bytes(k));
+  // No more threads than have room: those that waited for it could not help inside the others.
+  int threads = ResolveThreads(room.threads);
+  if (room_bytes > 0) {
+    threads = static_cast<int>(std::clamp(room_bytes / largest_bytes, 1.0, 1.0 * threads));
+  }
+  std::mutex mutex;
+  int done = 0;
+  ParallelFor(0, static_cast<int>(count), threads, [&](int k) {
     progress.ThrowIfInterrupted();
-    const auto share = memory.Take(bytes(static_cast<size_t>(k)));
     body(static_cast<size_t>(k));
-    if (!stage.empty()) progress.Update(++done);
+    if (stage.empty()) return;
+    const std::lock_guard lock(mutex);  // what is told only grows
+    progress.Update(++done);
   });
 }
 

@@ -259,8 +259,18 @@ TEST(OnePlace, NamesThePhotosOfEachBracket) {
   EXPECT_EQ(
       OnePlaceLine(model),
       "6 photos share 2 positions (exposure brackets, bursts): image105 + image106; image108 + "
-      "image109 + image110 + image111; points that they alone see are left out");
+      "image109 + image110 + image111");
   EXPECT_EQ(OnePlaceLine(ModelFrom(MakeBundle(Noisy()))), "");
+}
+
+TEST(OnePlace, FramesOfASlowVideoShareNone) {
+  SceneSpec spec{.images = 12, .points = 400, .noise_px = 0.3};
+  spec.point = testing::Walk().point;
+  spec.pose = [](int i, int) {
+    const Eigen::Vector3d centre(0.03 * i, 0, 2);  // of some 8.5 to what it sees
+    return testing::bundle::LookAt(centre, centre + Eigen::Vector3d(0, 10, 0));
+  };
+  EXPECT_TRUE(ImagesOfOnePlace(ModelFrom(MakeBundle(spec))).empty());
 }
 
 TEST(Refine, TooFewPointsAreLeftAlone) {
