@@ -9,7 +9,7 @@ import re
 import sys
 
 WIDTH = 140
-BLOCK = re.compile(r"(<!-- output (\S+): (.+) -->\n```\n)(.*?)(```\n)", re.DOTALL)
+BLOCK = re.compile(r"(<!-- output (\S+): ([^\n]+) -->\n```\n)(.*?)(```\n)", re.DOTALL)
 
 
 def lines_of(log, expression):
