@@ -263,8 +263,7 @@ TEST_F(RefineToPlaces, PlacesThatTellNothingAreRejected) {
     WritePhotoAt(folder_ / fmt::format("photos/image{}.jpg", 100 + i), {20, 30, 0});
   }
   ExpectRejected(Refine({"--gps", In("photos")}), kFailed,
-                 "alignment: expected points that are not on one line, found the second set in one "
-                 "point; the rotation about it is unknown: use more points");
+                 "photos of the model with GPS give the same latitude and longitude");
 }
 
 // EXIF says a radius, of which 68 % is taken to lie within.
