@@ -16,11 +16,7 @@ std::vector<advise::CoarseView> CoarseViewsOf(const std::filesystem::path& folde
   const std::vector<int> which = ViewsWithDepth(views);
   std::vector<advise::CoarseView> coarse(which.size());
   ForViews(views, which, "reading depth", room, progress, [&](size_t k) {
-    View loaded = views[static_cast<size_t>(which[k])];
-    io::LoadOptions load;
-    load.images = false;
-    load.threads = 1;  // views are side by side
-    io::LoadPixels(folder, loaded, load);
+    const View loaded = Loaded(views[static_cast<size_t>(which[k])], folder, {.images = false});
     coarse[k] = advise::MakeCoarse(loaded, advise::kCoarseSidePx);
   });
   return coarse;

@@ -26,7 +26,7 @@ constexpr int kInks = 4;
 // it swallowed, or none where decoding ran out of data, which libjpeg reports.
 constexpr int kFewBytes = 64;
 
-// libjpeg ends the program on errors unless told to jump; its text is kept.
+// libjpeg ends the program on errors unless error_exit jumps; its text is kept.
 struct Complaint {
   jpeg_error_mgr manager{};  // first: libjpeg knows it by this
   std::jmp_buf back{};

@@ -19,7 +19,7 @@ namespace {
 // count, not how visible they are in one photo.
 constexpr unsigned kSteps[] = {30, 40};
 
-// libjpeg ends the program on errors unless told to jump; its text is kept.
+// libjpeg ends the program on errors unless error_exit jumps; its text is kept.
 struct ErrorText {
   jpeg_error_mgr manager{};  // first: libjpeg knows it by this
   std::jmp_buf back{};

@@ -280,7 +280,7 @@ TEST(ReadImage, AJpegWithAHoleOrWithoutItsSecondHalfIsNoPhoto) {
   EXPECT_THAT(reason(never_written), ::testing::HasSubstr("; copy the file again"));
 }
 
-// Webcams leave a few bytes behind the last row, some cameras fill up to a round size.
+// Webcams leave a few bytes behind the last row, some cameras fill up to a multiple of a block.
 TEST(ReadImage, WhatCamerasLeaveBehindTheLastRowOfAJpegDoesNoHarm) {
   const TemporaryFolder folder;
   WriteImage(folder / "a.jpg", SmoothImage(48, 32));

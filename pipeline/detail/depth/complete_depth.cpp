@@ -23,14 +23,6 @@ constexpr double kFarthest = 50;       // times the farthest measured depth: dra
 constexpr double kStepPx = 0.5;        // pixels of disparity between depths that are stored
 constexpr double kLeastRoomGb = 0.01;  // a view at a time
 
-View Loaded(const View& view, const io::SetWriter& writer) {
-  View loaded = view;
-  io::LoadOptions load;
-  load.threads = 1;
-  io::LoadPixels(writer.folder(), loaded, load);
-  return loaded;
-}
-
 double NearestOf(const DepthImage& completed, double far_z) {
   double near_z = far_z / 2;
   for (const float z : completed.grid().data()) {
@@ -106,7 +98,7 @@ std::vector<stereo::ScenePlane> CompleteDepth(DtrSet& set, const SparseScene& sp
   std::vector<stereo::CellView> cells(sources.size());
   ForViews(views, sources, "", beside, progress, [&](size_t k) {
     const auto v = static_cast<size_t>(sources[k]);
-    View view = Loaded(views[v], writer);
+    View view = Loaded(views[v], writer.folder());
     // What is far is no surface that goes on.
     if (known.depth) Fill(known.depth(v, view), far_z, view);
     cells[k] = stereo::MakeCells(view);
@@ -125,8 +117,8 @@ std::vector<stereo::ScenePlane> CompleteDepth(DtrSet& set, const SparseScene& sp
   const auto completed = stereo::CompleteCells(cells, neighbours, planes, room.threads, progress);
   ForViews(views, sources, "completed depth", beside, progress, [&](size_t k) {
     const auto v = static_cast<size_t>(sources[k]);
-    const DepthImage depth =
-        Completed(cells[k], completed[k], far_z, Loaded(views[v], writer), v, known, views[v]);
+    const DepthImage depth = Completed(cells[k], completed[k], far_z,
+                                       Loaded(views[v], writer.folder()), v, known, views[v]);
     writer.WriteCompleted(depth, views[v]);
   });
   return planes;

@@ -26,12 +26,7 @@ void SetGains(DtrSet& set, const SparseScene& sources_scene, const std::filesyst
   }
   std::vector<SmallView> small(sources.size());
   ForViews(views, sources, "", room, progress, [&](size_t k) {
-    View loaded = views[static_cast<size_t>(sources[k])];
-    io::LoadOptions load;
-    load.sigma = false;
-    load.threads = 1;  // views are side by side
-    io::LoadPixels(folder, loaded, load);
-    small[k] = ShrinkForGains(loaded);
+    small[k] = ShrinkForGains(Loaded(views[static_cast<size_t>(sources[k])], folder));
   });
   const auto partners = NeighboursOf(views, sources, sources_scene, kPartners);
   const std::vector<Eigen::Vector3d> gains = EstimateGains(small, partners, room.threads);

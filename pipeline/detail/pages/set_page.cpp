@@ -36,14 +36,7 @@ void WriteSetPage(const io::SetWriter& writer, const DtrSet& set, const SetPageF
   info.for_rows = [&](size_t, const std::function<void(size_t)>& row) {
     ForViews(views, all_views, "page", facts.room, progress, row);
   };
-  info.load = [&](const View& view) {
-    View loaded = view;
-    io::LoadOptions load;
-    load.sigma = true;
-    load.threads = 1;  // views are side by side
-    io::LoadPixels(writer.folder(), loaded, load);
-    return loaded;
-  };
+  info.load = [&](const View& view) { return Loaded(view, writer.folder(), {.sigma = true}); };
   for (const auto& [name, reason] : facts.skipped) info.skipped.push_back({name, reason});
   std::filesystem::create_directories(writer.folder() / "report");
   WriteFileAtomically(writer.folder() / "report" / "index.html", report::SetReport(sources, info));

@@ -15,28 +15,14 @@
 #include "dtr/render/scene.h"
 
 namespace dtr::pipeline {
-namespace {
-
-// A copy of the view with its stored depth and, if wanted, image and mask.
-View Loaded(const View& view, const io::SetWriter& writer, bool images, bool completed = false) {
-  View loaded = view;
-  io::LoadOptions load;
-  load.images = images;
-  load.completed = completed;
-  load.threads = 1;  // views are side by side
-  io::LoadPixels(writer.folder(), loaded, load);
-  return loaded;
-}
-
-}  // namespace
-
 void FinishScene(DtrSet& set, std::span<const SparsePoint> points, const io::SetWriter& writer,
                  const Room& room, Progress& progress) {
   const std::vector<View>& views = set.frames.front().views;
   const std::vector<int> which = ViewsWithDepth(views);
   std::vector<DepthSamples> samples(which.size());
   ForViews(views, which, "extent of the scene", room, progress, [&](size_t k) {
-    samples[k].Add(Loaded(views[static_cast<size_t>(which[k])], writer, false));
+    samples[k].Add(
+        Loaded(views[static_cast<size_t>(which[k])], writer.folder(), {.images = false}));
   });
   DepthSamples all;
   for (const DepthSamples& of_view : samples) all.Append(of_view);
@@ -50,7 +36,7 @@ void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, const Room
   const std::vector<int> which = ViewsWithDepth(views);
   ForViews(views, which, "coding depth", room, progress, [&](size_t k) {
     View& view = views[static_cast<size_t>(which[k])];
-    View loaded = Loaded(view, writer, false);
+    View loaded = Loaded(view, writer.folder(), {.images = false});
     if (!io::TrySetDepthError(loaded, error_px * ThresholdsOf(loaded, {}).pixel)) {
       throw Error(fmt::format(
           "`depth_error` {}: {}: expected a bound that 16 bits can keep over its depths of {:.4g} "
@@ -71,7 +57,7 @@ DepthCount WriteMeshes(DtrSet& set, io::SetWriter& writer, const Room& room, Pro
   std::atomic<long> with_depth = 0, pixels = 0;
   ForViews(views, which, "meshes", room, progress, [&](size_t k) {
     View& view = views[static_cast<size_t>(which[k])];
-    const View loaded = Loaded(view, writer, true, true);
+    const View loaded = Loaded(view, writer.folder(), {.completed = true});
     writer.WriteMesh(view, MakeStoredMesh(loaded, RenderOptions{}, room.threads));
     const auto measured = MeasuredDepth(loaded).grid().data();
     with_depth += std::ranges::count_if(measured, [](float z) { return !DepthImage::IsHole(z); });

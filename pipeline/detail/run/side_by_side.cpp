@@ -44,9 +44,16 @@ void SideBySide(size_t count, const std::string& stage, const Room& room,
     progress.ThrowIfInterrupted();
     body(static_cast<size_t>(k));
     if (stage.empty()) return;
-    const std::lock_guard lock(mutex);  // what is told only grows
+    const std::lock_guard lock(mutex);  // the count reported only grows
     progress.Update(++done);
   });
+}
+
+View Loaded(const View& view, const std::filesystem::path& folder, io::LoadOptions load) {
+  View loaded = view;
+  load.threads = 1;
+  io::LoadPixels(folder, loaded, load);
+  return loaded;
 }
 
 void ForViews(std::span<const View> views, std::span<const int> which, const std::string& stage,

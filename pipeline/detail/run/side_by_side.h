@@ -1,11 +1,13 @@
 // pipeline/detail/run/side_by_side.h -- work on stored views, several of them at a time.
 #pragma once
+#include <filesystem>
 #include <functional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "dtr/base/progress.h"
+#include "dtr/io/set_io.h"
 #include "dtr/types/view.h"
 #include "pipeline/room.h"
 
@@ -24,5 +26,8 @@ void SideBySide(size_t count, const std::string& stage, const Room& room,
 /// The same for views, where which[k] is the index of one whose pixels body(k) loads.
 void ForViews(std::span<const View> views, std::span<const int> which, const std::string& stage,
               const Room& room, Progress& progress, const std::function<void(size_t k)>& body);
+
+/// A copy of the view with its stored pixels, read by one thread: others read other views.
+View Loaded(const View& view, const std::filesystem::path& folder, io::LoadOptions load = {});
 
 }  // namespace dtr::pipeline
