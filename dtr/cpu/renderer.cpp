@@ -90,7 +90,7 @@ RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
     ParallelFor(band.first_row, band.first_row + band.rows, options.threads,
                 [&](int y) { ResolveRow(setup.settings, views, y, result); });
   }
-  if (const auto curve = CurveOf(FrameExposure(scene, selection, novel_from_world))) {
+  if (const auto curve = CurveOf(setup.exposure)) {
     curve->Apply(result.image);
   }
   result.coverage_share = CoverageShare(result.coverage);

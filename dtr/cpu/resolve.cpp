@@ -1,12 +1,12 @@
 #include "dtr/cpu/resolve.h"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <vector>
 
 #include "dtr/render/colour.h"
 #include "dtr/render/deferred_limits.h"
+#include "dtr/render/exposure.h"
 #include "dtr/render/geometry.h"
 #include "dtr/render/texture.h"
 #include "dtr/render/valid_views.h"
@@ -19,6 +19,7 @@ struct Fragment {
   double inverse_depth = 0;
   Eigen::Vector3d point_in_novel = Eigen::Vector3d::Zero();
   Eigen::Vector2d source_pixel = Eigen::Vector2d::Zero();  ///< on the view's image
+  Eigen::Vector3d colour = Eigen::Vector3d::Zero();        ///< SPEC 4.4
   double angle_rad = 0;                                    ///< SPEC 4.5, at the point
 };
 
@@ -32,6 +33,7 @@ class RowResolver {
     Collect(x, y);
     if (fragments_.empty()) return;
     const double front = FrontInverseDepth();
+    RestoreClipped(x, y, front);
     const double border = BorderInverseDepth();
     result.coverage(x, y) = 255;
     result.depth(x, y) = static_cast<float>(1 / front);
@@ -72,13 +74,13 @@ class RowResolver {
         fragment.angle_rad = AngleAt(fragment);
         if (fragment.angle_rad > settings_.blend.max_angle_rad) continue;
       }
-      if (!FindSourcePixel(fragment)) continue;
+      if (!FindColour(fragment)) continue;
       fragments_.push_back(fragment);
     }
   }
 
   /// SPEC 4.4. False where the view has no colour to give.
-  static bool FindSourcePixel(Fragment& fragment) {
+  bool FindColour(Fragment& fragment) const {
     const View& source = *fragment.view->in_novel->view;
     const Eigen::Vector3d point_in_view =
         fragment.view->view_from_novel_rotation * fragment.point_in_novel +
@@ -86,7 +88,37 @@ class RowResolver {
     const auto pixel = source.camera.PixelFromCam(point_in_view);
     if (!pixel || !pixel->allFinite()) return false;
     fragment.source_pixel = *pixel;
-    return source.mask.empty() || ColourAt(source, fragment.source_pixel, false).has_value();
+    const auto colour = ColourAt(source, fragment.source_pixel, settings_.linear_light);
+    fragment.colour = colour.value_or(Eigen::Vector3d::Zero());
+    return colour.has_value();
+  }
+
+  double ClippedShareOf(const Fragment& f) const {
+    return ClippedShare(f.view->clipped, f.colour.maxCoeff(), settings_.linear_light);
+  }
+
+  /// SPEC 4.4: the greatest value of each channel that a photo has at a point and did not clip.
+  Eigen::Vector3d Unclipped(const Eigen::Vector3d& point_in_novel) const {
+    Eigen::Vector3d greatest = Eigen::Vector3d::Zero();
+    for (const ResolveView& view : views_) {
+      Fragment at{&view, 0, point_in_novel};
+      if (!FindColour(at) || !view.in_novel->view->camera.Contains(at.source_pixel)) continue;
+      if (ClippedShareOf(at) < 0.5) greatest = greatest.cwiseMax(at.colour);
+    }
+    return greatest;
+  }
+
+  /// SPEC 4.4: clipped colours as others measured them, where they measured one.
+  void RestoreClipped(int x, int y, double front) {
+    const auto clipped = [](const Fragment& f) { return f.view->clipped > 0; };
+    if (std::none_of(fragments_.begin(), fragments_.end(), clipped)) return;
+    const Eigen::Vector3d unclipped =
+        Unclipped(settings_.novel.RayFromPixel({x + 0.5, y + 0.5}) / front);
+    const double least = settings_.linear_light ? kSameSurfaceInLinearLight : kSameSurface;
+    for (Fragment& f : fragments_) {
+      const bool same = (unclipped.array() >= least * f.colour.array()).all();
+      if (same) f.colour += ClippedShareOf(f) * (unclipped - f.colour);
+    }
   }
 
   /// SPEC 4.2, pass 1: where Delta pushes a fragment; only the compared depth moves.
@@ -151,12 +183,7 @@ class RowResolver {
     }
     result.view_count(x, y) = static_cast<std::uint8_t>(std::min(blended, 255));
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (size_t i = 0; i < fragments_.size(); ++i) {
-      const Fragment& f = fragments_[i];
-      const auto colour = ColourAt(*f.view->in_novel->view, f.source_pixel, settings_.linear_light);
-      assert(colour.has_value());  // Collect left out the others
-      sum += shares_[i] * *colour;
-    }
+    for (size_t i = 0; i < fragments_.size(); ++i) sum += shares_[i] * fragments_[i].colour;
     for (int channel = 0; channel < 3; ++channel) {
       result.image(x, y, channel) =
           settings_.linear_light ? Srgb8FromLinear(sum[channel]) : Srgb8FromSrgb(sum[channel]);

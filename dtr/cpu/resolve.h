@@ -19,6 +19,7 @@ struct ResolveView {
   double cut_factor = 1;           ///< SPEC 1.4
   Grid<std::uint8_t> rim_factors;  ///< SPEC 4.8
   Fading fading;                   ///< SPEC 4.8
+  double clipped = 0;              ///< SPEC 4.4
 };
 
 /// What it needs to know about the image.

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "dtr/base/parallel_for.h"
+#include "dtr/render/exposure.h"
 #include "dtr/render/frame.h"
 #include "dtr/render/texture.h"
 
@@ -35,6 +36,7 @@ Setup MakeSetup(const RenderScene& scene, const ViewSelection& selection,
   for (const int index : setup.order) {
     setup.placed.push_back(InNovel(*scene.views[static_cast<size_t>(index)], novel_from_world));
   }
+  setup.exposure = FrameExposure(scene, selection, novel_from_world);
   setup.views.resize(setup.order.size());
   ParallelFor(0, static_cast<int>(setup.views.size()), options.threads, [&](int i) {
     const ViewInNovel& placed = setup.placed[static_cast<size_t>(i)];
@@ -46,6 +48,7 @@ Setup MakeSetup(const RenderScene& scene, const ViewSelection& selection,
     view.rim_factors = RimFactors(*placed.view);
     view.fading =
         FadingOf(*placed.view, CornersMovedPx(*placed.view, novel, novel_from_world, scene.center));
+    view.clipped = ClippedOf(*placed.view, setup.exposure);
   });
   SetCutFactors(selection, setup.order, setup.views);
   ResolveSettings& settings = setup.settings;

@@ -15,6 +15,7 @@ struct Setup {
   std::vector<ViewInNovel> placed;
   std::vector<ResolveView> views;
   ResolveSettings settings;
+  Eigen::Vector3d exposure;  ///< FrameExposure
 };
 
 Setup MakeSetup(const RenderScene& scene, const ViewSelection& selection,

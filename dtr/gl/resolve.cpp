@@ -56,7 +56,7 @@ ViewBlock BlockOf(const View& view, const ViewPlacement& placed, double cut_fact
   block.stored_depth = {0, static_cast<float>(1 / placed.near_z),
                         static_cast<float>(thresholds.pixel), 0};
   block.fading = {static_cast<float>(cut_factor), static_cast<float>(placed.fading.gain),
-                  static_cast<float>(placed.fading.offset), 0};
+                  static_cast<float>(placed.fading.offset), static_cast<float>(placed.clipped)};
   return block;
 }
 
@@ -156,6 +156,7 @@ const Program& Resolver::ProgramFor(const RenderFrame& frame, ProgramCache& prog
        define("BLEND", BlendNumber(frame.options.blend)),
        define("VIEWS_IN_UNIFORMS", BlocksFitUniforms(views)), define("PER_PIXEL", frame.per_pixel),
        define("LINEAR_LIGHT", frame.options.blend_in_linear_light),
+       define("CLIPPED", frame.AnyClipped()),
        define("EXPOSED", frame.exposure != Eigen::Vector3d::Ones())});
 }
 

@@ -10,10 +10,17 @@ namespace {
 
 /// Turning by an angle counts as moving by this share of the arc about the scene centre.
 constexpr double kTurnShare = 0.3;
+/// What is clipped is no colour at all in a photo that is e^(1/4) times as bright as the image.
+constexpr double kClippedPerLogExposure = 4;
 /// A view nearer than this share of its distance from the scene centre is at the frame's place.
 constexpr double kSamePlace = 1e-6;
 
 }  // namespace
+
+double ClippedOf(const View& view, const Eigen::Vector3d& exposure) {
+  const double log_ratio = (view.gain.array() * exposure.array()).log().mean();
+  return std::clamp(-kClippedPerLogExposure * log_ratio, 0.0, 1.0);
+}
 
 Eigen::Vector3d FrameExposure(const RenderScene& scene, const ViewSelection& selection,
                               const Pose& novel_from_world) {

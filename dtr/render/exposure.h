@@ -1,6 +1,7 @@
 // dtr/render/exposure.h -- SPEC 4.4, 4.9: photos and rendered images in another exposure.
 #pragma once
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -28,6 +29,20 @@ inline double ExposureBetween(double from, double to) {
   const auto darkness = [](double v) { return 1 / (v * v * v * v) - 1; };
   return std::sqrt(std::sqrt(darkness(from) / darkness(to)));
 }
+
+/// SPEC 4.4: from 0 to 1, how far what a view's photo clipped is no colour for an image of this
+/// exposure (FrameExposure): 0 unless the image is darker than the photo.
+double ClippedOf(const View& view, const Eigen::Vector3d& exposure);
+
+/// SPEC 4.4: how far a colour is clipped, from 0 to `clipped` (ClippedOf); `greatest` of its
+/// channels as they are blended, in [0, 1].
+inline double ClippedShare(double clipped, double greatest, bool linear_light) {
+  const double square = greatest * greatest, fourth = square * square;
+  return clipped * std::min(2 * (linear_light ? fourth : fourth * fourth), 1.0);
+}
+
+/// SPEC 4.4: the darker of two colours of one surface has this share of every channel of the other.
+inline constexpr double kSameSurface = 0.75, kSameSurfaceInLinearLight = 0.5;
 
 /// SPEC 4.9. The exposure per channel of an image from `novel_from_world`, that of its nearest
 /// views, against the set's mean, in which the views are blended. All are exactly 1 where no view

@@ -95,6 +95,7 @@ RenderFrame MakeFrame(const RenderScene& scene, const PinholeCamera& novel,
     frame.placements.push_back(PlaceView(view, novel_from_world));
     frame.placements.back().fading =
         FadingOf(view, CornersMovedPx(view, novel, novel_from_world, scene.center));
+    frame.placements.back().clipped = ClippedOf(view, frame.exposure);
     frame.cut_factors.push_back(1);
   }
   return frame;

@@ -1,6 +1,7 @@
 // dtr/render/frame.h -- the parts of drawing one image that every renderer has in common.
 #pragma once
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -29,8 +30,9 @@ double CoverageShare(const Mask& coverage);
 struct ViewPlacement {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< novel_from_view
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();   ///< also the view's centre in novel
-  double near_z = 0;  ///< triangles are cut here, SPEC 2.5; scene units
-  Fading fading;      ///< SPEC 4.8; MakeFrame sets it
+  double near_z = 0;   ///< triangles are cut here, SPEC 2.5; scene units
+  Fading fading;       ///< SPEC 4.8; MakeFrame sets it
+  double clipped = 0;  ///< SPEC 4.4 (ClippedOf); MakeFrame sets it
 };
 
 /// SPEC 0.5: from the difference of the centres, so that the world's offset cancels before anything
@@ -63,6 +65,11 @@ struct RenderFrame {
     views.erase(views.begin() + at);
     placements.erase(placements.begin() + at);
     cut_factors.erase(cut_factors.begin() + at);
+  }
+  /// SPEC 4.4: some photo has clipped what is no white in this image.
+  bool AnyClipped() const {
+    return std::ranges::any_of(placements,
+                               [](const ViewPlacement& placed) { return placed.clipped > 0; });
   }
   bool deferred() const { return options.method == RenderMethod::kDeferred; }
 };

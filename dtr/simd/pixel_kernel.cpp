@@ -6,6 +6,7 @@
 
 #include "dtr/render/colour.h"
 #include "dtr/render/deferred_limits.h"
+#include "dtr/render/exposure.h"
 
 // The rest of this file is compiled once per instruction set; the best one is chosen at run time.
 #undef HWY_TARGET_INCLUDE
@@ -229,6 +230,63 @@ struct Front {
   VF nearest, border;
 };
 
+/// SPEC 4.4 (ClippedShare).
+HWY_INLINE VF ClippedShareOf(const PixelRow& row, const PixelView& view, const Colour& colour) {
+  const float unit = row.linear == nullptr ? 1 / 255.0f : 1;
+  const VF greatest = hn::Mul(hn::Max(hn::Max(colour.r, colour.g), colour.b), Constant(unit));
+  const VF square = hn::Mul(greatest, greatest), fourth = hn::Mul(square, square);
+  const VF white = row.linear == nullptr ? hn::Mul(fourth, fourth) : fourth;
+  return hn::Mul(Constant(view.clipped), hn::Min(hn::Add(white, white), Constant(1)));
+}
+
+/// SPEC 4.4: the greatest value of each channel that a photo has at `w` and did not clip.
+HWY_INLINE Colour Unclipped(const PixelRow& row, std::span<const PixelView> views, const Rays& rays,
+                            VF w) {
+  const DF d;
+  const VF zero = hn::Zero(d);
+  Colour greatest{zero, zero, zero, zero};
+  for (const PixelView& view : views) {
+    const RayOnGrid base(view, rays);
+    const VF z = hn::MulAdd(w, Constant(view.grid_z[3]), base.z), per_z = hn::Div(Constant(1), z);
+    const auto on_image = [&](VF along, int axis) {
+      return hn::MulAdd(hn::Mul(along, per_z), Constant(view.image_per_sample[axis]),
+                        Constant(view.image_offset[axis]));
+    };
+    const VF x = on_image(hn::MulAdd(w, Constant(view.grid_x[3]), base.x), 0);
+    const VF y = on_image(hn::MulAdd(w, Constant(view.grid_y[3]), base.y), 1);
+    const auto within = [](VF at, int size_px) {
+      const float half = 0.5f * static_cast<float>(size_px);
+      return hn::Lt(hn::Abs(hn::Sub(at, Constant(half - 0.5f))), Constant(half));
+    };
+    MF is = hn::And(hn::And(hn::Gt(w, zero), hn::Gt(z, zero)),
+                    hn::And(within(x, view.width_px), within(y, view.height_px)));
+    if (hn::AllFalse(d, is)) continue;
+    const Colour colour =
+        ColourAt(view, row.linear, hn::IfThenElseZero(is, x), hn::IfThenElseZero(is, y), is);
+    is = hn::And(is, hn::And(hn::Gt(colour.a, zero),
+                             hn::Lt(ClippedShareOf(row, view, colour), Constant(0.5f))));
+    greatest.r = hn::Max(greatest.r, hn::IfThenElseZero(is, colour.r));
+    greatest.g = hn::Max(greatest.g, hn::IfThenElseZero(is, colour.g));
+    greatest.b = hn::Max(greatest.b, hn::IfThenElseZero(is, colour.b));
+  }
+  return greatest;
+}
+
+/// SPEC 4.4: a clipped colour as others measured it, where they measured one.
+HWY_INLINE void Restore(const PixelRow& row, const PixelView& view, const Colour& unclipped,
+                        Colour* colour) {
+  const VF share_of_same = Constant(
+      static_cast<float>(row.linear == nullptr ? kSameSurface : kSameSurfaceInLinearLight));
+  const auto least = [&](VF of) { return hn::Mul(share_of_same, of); };
+  const MF same = hn::And(
+      hn::Ge(unclipped.r, least(colour->r)),
+      hn::And(hn::Ge(unclipped.g, least(colour->g)), hn::Ge(unclipped.b, least(colour->b))));
+  const VF share = hn::IfThenElseZero(same, ClippedShareOf(row, view, *colour));
+  colour->r = hn::MulAdd(share, hn::Sub(unclipped.r, colour->r), colour->r);
+  colour->g = hn::MulAdd(share, hn::Sub(unclipped.g, colour->g), colour->g);
+  colour->b = hn::MulAdd(share, hn::Sub(unclipped.b, colour->b), colour->b);
+}
+
 /// SPEC 5.3 and 4.2: each view's fragment near `surface` into the group.
 HWY_INLINE Front FindFragments(const PixelRow& row, std::span<const PixelView> views,
                                const Rays& rays, VF surface, Group* group) {
@@ -266,7 +324,7 @@ HWY_INLINE MF AtBorder(size_t views, const Front& front, Group* group) {
 /// SPEC 4.4, 4.7, 4.8: the colours' sum, of 255 or in linear light, and, as alpha, that of the
 /// shares. `cut`: of SPEC 1.4, with the per-pixel rule.
 HWY_INLINE Colour Blend(const PixelRow& row, std::span<const PixelView> views, VF total, VF cut,
-                        Group* group) {
+                        const Colour& unclipped, Group* group) {
   const DF d;
   const VF zero = hn::Zero(d);
   VF r = zero, g = zero, b = zero, sum = zero;
@@ -275,8 +333,9 @@ HWY_INLINE Colour Blend(const PixelRow& row, std::span<const PixelView> views, V
     const VF weight = hn::Load(d, group->weight(i));
     const MF weighs = hn::Gt(weight, zero);
     if (hn::AllFalse(d, weighs)) continue;
-    const Colour colour = ColourAt(views[i], row.linear, hn::Load(d, group->image_x(i)),
-                                   hn::Load(d, group->image_y(i)), weighs);
+    Colour colour = ColourAt(views[i], row.linear, hn::Load(d, group->image_x(i)),
+                             hn::Load(d, group->image_y(i)), weighs);
+    if (views[i].clipped > 0) Restore(row, views[i], unclipped, &colour);
     const VF rim = hn::Max(colour.a, Constant(1));
     const VF fading =
         hn::Min(hn::MulAdd(rim, Constant(views[i].fade_gain / 255), Constant(views[i].fade_offset)),
@@ -318,10 +377,12 @@ HWY_INLINE Pixels ResolveGroup(const PixelRow& row, std::span<const PixelView> v
   const MF seen = hn::Gt(front.nearest, zero);
   if (hn::AllFalse(d, seen)) return none;
   const MF at_border = AtBorder(views.size(), front, group);
+  Colour unclipped{zero, zero, zero, zero};
+  if (row.clipped) unclipped = Unclipped(row, views, rays, front.nearest);
   VF cut = zero;
   if (row.nearest_views > 0) cut = DropAllButNearest(row, views, rays, front.border, group);
   const Weighed weighed = WeighFragments(row, views, rays, front.border, group);
-  const Colour sum = Blend(row, views, weighed.total, cut, group);
+  const Colour sum = Blend(row, views, weighed.total, cut, unclipped, group);
 
   const VF per_sum = hn::Div(Constant(1), sum.a), half = Constant(0.5f);
   const auto level = [&](VF of_sum) {

@@ -45,6 +45,7 @@ struct PixelView {
   float level_range;   ///< blocks whose samples differ by no more are whole; below 0: ask the bits
   float cut_factor;    ///< SPEC 1.4
   float fade_gain, fade_offset;  ///< SPEC 4.8
+  float clipped;                 ///< SPEC 4.4
   /// SampledImage, after which a row and kReadBeyond more pixels follow; in its pixels, the centre
   /// of the first at 0, a grid position is at image_per_sample * position + image_offset.
   const std::uint32_t* rgba;
@@ -68,6 +69,7 @@ struct PixelRow {
   bool precise_weights;
   int nearest_views;     ///< SPEC 1.3: K and max_angle hold at the point; 0: the sphere rule
   float absolute_delta;  ///< the report's Delta, scene units; negative: that of each view
+  bool clipped;          ///< RenderFrame::AnyClipped
   const float* linear;   ///< linear light of each 8-bit sRGB value, to blend in it; null: in sRGB
   const float* surface;  ///< SPEC 5.1: 1/z; 0: none
   // What SPEC 6 asks for.

@@ -76,6 +76,7 @@ PixelView PlaceView(const View& view, const ViewPlacement& placed, double cut_fa
   out.cut_factor = static_cast<float>(cut_factor);
   out.fade_gain = static_cast<float>(placed.fading.gain);
   out.fade_offset = static_cast<float>(placed.fading.offset);
+  out.clipped = static_cast<float>(placed.clipped);
   out.rgba = reinterpret_cast<const std::uint32_t*>(sampled.rgba.data());
   out.masked = MaskNeedsTest(view, options);
   out.width_px = view.camera.width_px(), out.height_px = view.camera.height_px();
@@ -106,6 +107,7 @@ PixelRow RowOf(const RenderFrame& frame, const float* linear) {
   row.precise_weights = !WeightsFitFloat(blend);
   row.nearest_views = frame.per_pixel ? frame.options.views : 0;
   row.absolute_delta = static_cast<float>(frame.options.absolute_delta.value_or(-1));
+  row.clipped = frame.AnyClipped();
   row.linear = frame.options.blend_in_linear_light ? linear : nullptr;
   return row;
 }

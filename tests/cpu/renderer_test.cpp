@@ -288,6 +288,61 @@ TEST(Render, BetweenTwoInputCamerasItIsExposedBetweenThem) {
   }
 }
 
+// Three photos of a bright wall, the middle one 2.2 times as bright in linear light, and so clipped
+// as a sensor does it; and the gains that bring all to their mean.
+constexpr double kWallLight = 0.5, kBrighter = 2.2;
+
+DtrSet ClippedBetweenOthers() {
+  std::vector<View> views;
+  for (int k = 0; k < 3; ++k) {
+    views.push_back(Photograph(Plane({0, 0, 1}, 10), ShotFrom("v" + std::to_string(k),
+                                                              {k - 1.0, 0, 0}, {k - 1.0, 0, 10})));
+    View& view = views.back();
+    const double exposure = k == 1 ? kBrighter : 1;
+    std::fill(view.image.data().begin(), view.image.data().end(),
+              Srgb8FromLinear(std::min(1.0, exposure * kWallLight)));
+    view.gain.setConstant(std::cbrt(kBrighter) / exposure);
+  }
+  return SetOf(std::move(views));
+}
+
+// What the wall is in the exposure of a frame.
+int WallIn(const RenderScene& scene, const RenderOptions& options, const Pose& cam_from_world) {
+  const Eigen::Vector3d frame =
+      FrameExposure(scene, SelectViews(scene, cam_from_world, options), cam_from_world);
+  return Srgb8FromLinear(Exposed(Exposed(kWallLight, std::cbrt(kBrighter)), frame[0]));
+}
+
+TEST(Render, WhatAPhotoClippedIsNoColourWhereAnotherMeasuredOne) {
+  const DtrSet set = ClippedBetweenOthers();
+  const RenderScene scene = MakeRenderScene(set);
+  const Shot novel = ShotFrom("n", {0.9, 0.3, 0}, {0.9, 0.3, 10});  // nearest to one that is not
+  for (const RenderMethod method : {RenderMethod::kTwoPass, RenderMethod::kDeferred}) {
+    for (const bool linear : {true, false}) {
+      RenderOptions options = OptionsOf(method);
+      options.blend_in_linear_light = linear;
+      const RenderResult result = Render(scene, novel.camera, novel.cam_from_world, options);
+      const int wall = WallIn(scene, options, novel.cam_from_world);
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(result.image(48, 36, c), wall, 2);
+    }
+  }
+  // At its own place the clipped photo is shown as it is.
+  const View& clipped = set.frames[0].views[1];
+  const RenderResult own =
+      Render(scene, clipped.camera, clipped.cam_from_world, OptionsOf(RenderMethod::kDeferred));
+  EXPECT_GE(own.image(48, 36, 0), 253);
+}
+
+TEST(Render, WhatAPhotoClippedIsShownWhereNoOtherSeesAnything) {
+  DtrSet set = ClippedBetweenOthers();
+  for (const size_t k : {0u, 2u}) set.frames[0].views[k].mask = Mask(96, 72, 1, 0);
+  const Shot novel = ShotFrom("n", {0.2, 0.3, 0}, {0.2, 0.3, 10});
+  const RenderResult result = Render(MakeRenderScene(set), novel.camera, novel.cam_from_world,
+                                     OptionsOf(RenderMethod::kDeferred));
+  EXPECT_EQ(result.coverage(48, 36), 255);
+  EXPECT_EQ(result.image(48, 36, 1), 255);
+}
+
 TEST(Render, MaskedPixelsAreNeitherShownNorInTheWay) {
   DtrSet set = SquareBeforePlane();
   View& view = set.frames[0].views[0];

@@ -1,7 +1,7 @@
 // SPEC 4.2 to 4.8 and 6: how the views' nearest fragments are blended, pixel by pixel. One sum in
 // the views' canonical order and one division: nothing depends on the order they were drawn in.
 // Defines: MAX_VIEWS, IMAGE_ARRAYS, DEPTH_ARRAYS (0: two passes, else SPEC 5), BLEND, PER_PIXEL,
-// LINEAR_LIGHT, EXPOSED, VIEWS_IN_UNIFORMS.
+// LINEAR_LIGHT, EXPOSED, CLIPPED, VIEWS_IN_UNIFORMS.
 layout(local_size_x = 8, local_size_y = 8) in;
 #if DEPTH_ARRAYS
 layout(std430, binding = 2) readonly buffer Depth { uint nearest[]; };  // SPEC 5.1
@@ -48,6 +48,11 @@ float out_depth = 0.0;        // plane z of the front surface
 uvec4 out_marks = uvec4(0u);  // view count, 255 at the Delta border, unused
 
 const float kLargestFloat = 3.4e38;
+#if LINEAR_LIGHT
+const float kSameSurface = 0.5;  // SPEC 4.4
+#else
+const float kSameSurface = 0.75;
+#endif
 
 float fragment[MAX_VIEWS];  // 1/z; 0: absent
 float angle[MAX_VIEWS];     // SPEC 4.5, at the point
@@ -139,6 +144,37 @@ bool Exists(ViewBlock view, vec3 ray, float w) {
   return view.image.z == 0 || ColourAt(view, SourcePixel(view, p)).a > 0.0;
 }
 
+#if CLIPPED
+// SPEC 4.4: how far a colour is clipped.
+float ClippedShare(ViewBlock view, vec3 colour) {
+  float greatest = max(max(colour.r, colour.g), colour.b), white = greatest * greatest * greatest * greatest;
+#if !LINEAR_LIGHT
+  white *= white;
+#endif
+  return view.fading.w * min(2.0 * white, 1.0);
+}
+
+// SPEC 4.4: the greatest value of each channel that a photo has at a point and did not clip.
+vec3 Unclipped(vec3 ray, float w) {
+  vec3 greatest = vec3(0.0);
+  for (int i = 0; i < view_count; ++i) {
+    ViewBlock view = views[i];
+    vec3 p = PointInView(view, ray, w);
+    vec2 pixel = SourcePixel(view, p);
+    if (!(p.z > 0.0) || any(lessThan(pixel, vec2(0.0))) || any(greaterThanEqual(pixel, view.limits.xy))) continue;
+    vec4 colour = ColourAt(view, pixel);
+    if (colour.a > 0.0 && ClippedShare(view, colour.rgb) < 0.5) greatest = max(greatest, colour.rgb);
+  }
+  return greatest;
+}
+
+// SPEC 4.4: a clipped colour as others measured it, where they measured one.
+vec3 Restored(ViewBlock view, vec3 colour, vec3 unclipped) {
+  bool same = all(greaterThanEqual(unclipped, kSameSurface * colour));
+  return same ? mix(colour, unclipped, ClippedShare(view, colour)) : colour;
+}
+#endif
+
 // SPEC 1.4.
 float CutFactor(float t, float cut) {
   return cut > 0.0 ? clamp((cut - t) / (0.25 * cut), kLeastFactor, 1.0) : 1.0;
@@ -184,6 +220,9 @@ void Resolve(ivec2 target) {
   }
   if (!(front > 0.0)) return;
   out_depth = 1.0 / front;
+#if CLIPPED
+  vec3 unclipped = Unclipped(ray, front);
+#endif
 
   // SPEC 4.3, with the same Delta.
   float margin = kBorderShare * (front - border);
@@ -247,6 +286,9 @@ void Resolve(ivec2 target) {
     if (fragment[i] == 0.0 || !(weight[i] > 0.0)) continue;
     ViewBlock view = views[i];
     vec4 colour = ColourAt(view, SourcePixel(view, PointInView(view, ray, fragment[i])));
+#if CLIPPED
+    colour.rgb = Restored(view, colour.rgb, unclipped);
+#endif
     float factor = min(view.fading.y * colour.a + view.fading.z, 1.0);
 #if PER_PIXEL
     factor *= CutFactor(angle[i], cut);

@@ -20,7 +20,7 @@ struct ViewBlock {
   // 1/z of a stored value v is x + y v (two passes: of the layer's); z: a pixel of disparity as a
   // difference of 1/z (SPEC 0.3); w: unused
   vec4 stored_depth;
-  vec4 fading;  // SPEC 1.4's factor, SPEC 4.8's gain and offset, unused
+  vec4 fading;  // SPEC 1.4's factor, SPEC 4.8's gain and offset, SPEC 4.4's clipped
 };
 #ifdef __cplusplus
 #undef vec4

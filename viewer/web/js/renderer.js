@@ -3,18 +3,18 @@ import { Program, Target } from "./gl.js";
 import { ViewStore } from "./store.js";
 import { codeRange } from "./depth_codes.js";
 import { norm, sub } from "./maths.js";
-import { fadingOf, frameExposure, kCandidates, kMaxAngle, kViews, placementOf, selectViews } from "./selection.js";
+import { clippedOf, fadingOf, frameExposure, kCandidates, kMaxAngle, kViews, placementOf, selectViews } from "./selection.js";
 
 const kFloatsPerView = 36;  // view.glsl
 
 // The view's uniform block, view.glsl.
-function blockOf(view, placement, cut, fading, layer, masked) {
+function blockOf(view, placement, cut, fading, clipped, layer, masked) {
   const codes = codeRange(view), scale = 1 / view.scale;
   const rows = placement.rotation.flatMap((row, i) => [...row, placement.translation[i]]);
   return [...rows, view.fx, view.fy, view.cx, view.cy, view.width, view.height, view.columns, view.rows,
     view.fx * scale, view.fy * scale, view.cx * scale, view.cy * scale,
     codes.measured.first, codes.measured.step, codes.completed.first, codes.completed.step,
-    layer, masked ? 1 : 0, codes.measuredCodes, 1 / (view.fx * view.baseline), cut, fading.gain, fading.offset, 0];
+    layer, masked ? 1 : 0, codes.measuredCodes, 1 / (view.fx * view.baseline), cut, fading.gain, fading.offset, clipped];
 }
 
 // Positions of the mesh, half samples, to the novel screen, times z.
@@ -156,8 +156,8 @@ export class Renderer {
     const program = this.resolver(selection.perPixel).use();
     const floats = new Float32Array(kFloatsPerView * (selection.perPixel ? kCandidates : kViews));
     selection.views.forEach(({ view, cut }, i) => {
-      const fading = fadingOf(this.set, view, placements[i], novel);
-      floats.set(blockOf(view, placements[i], cut, fading, store.layerOf(view), view.parts.mask.size > 0), kFloatsPerView * i);
+      const fading = fadingOf(this.set, view, placements[i], novel), clipped = clippedOf(view, exposure);
+      floats.set(blockOf(view, placements[i], cut, fading, clipped, store.layerOf(view), view.parts.mask.size > 0), kFloatsPerView * i);
     });
     this.setBlock(program, "Views", floats);
     program.bind("images", 0, gl.TEXTURE_2D_ARRAY, store.images).bind("depths", 1, gl.TEXTURE_2D_ARRAY, store.depths)

@@ -90,6 +90,12 @@ export function placementOf(view, novel) {
 
 export const rimWidth = (view) => Math.max(kMinRimPx, Math.floor(kRimShare * Math.max(view.width, view.height)));
 
+/** SPEC 4.4: how far what the view's photo clipped is no colour for an image of this exposure. */
+export function clippedOf(view, exposure) {
+  const logRatio = [0, 1, 2].reduce((sum, c) => sum + Math.log(view.gain[c] * exposure[c]), 0) / 3;
+  return clamp(-4 * logRatio, 0, 1);
+}
+
 /** SPEC 4.8: how a view's rim factors become those of this image. */
 export function fadingOf(set, view, placement, novel) {
   const depth = norm(sub(set.center, novel.centre));

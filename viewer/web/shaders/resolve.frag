@@ -85,6 +85,26 @@ bool Exists(View view, vec3 ray, float w) {
   return p.z > 0.0 && (view.slots.y == 0.0 || ColourAt(view, SourcePixel(view, p)).a > 0.0);
 }
 
+// SPEC 4.4: how far a colour is clipped.
+float ClippedShare(View view, vec3 colour) {
+  float greatest = max(max(colour.r, colour.g), colour.b), white = greatest * greatest * greatest * greatest;
+  return view.fading.w * min(2.0 * white * white, 1.0);
+}
+
+// SPEC 4.4: the greatest value of each channel that a photo has at a point and did not clip.
+vec3 Unclipped(vec3 ray, float w) {
+  vec3 greatest = vec3(0.0);
+  for (int i = 0; i < view_count; ++i) {
+    View view = views[i];
+    vec3 p = PointInView(view, ray, w);
+    vec2 pixel = SourcePixel(view, p);
+    if (!(p.z > 0.0) || any(lessThan(pixel, vec2(0.0))) || any(greaterThanEqual(pixel, view.size.xy))) continue;
+    vec4 colour = ColourAt(view, pixel);
+    if (colour.a > 0.0 && ClippedShare(view, colour.rgb) < 0.5) greatest = max(greatest, colour.rgb);
+  }
+  return greatest;
+}
+
 // The rank-th smallest angle among the fragments that are left; 0: the smallest.
 float RankedAngle(int rank) {
   for (int i = 0; i < view_count; ++i) {
@@ -126,6 +146,8 @@ void main() {
   if (!(front > 0.0)) return;
   out_depth = floatBitsToUint(front);
 
+  vec3 unclipped = exposure == vec3(1.0) ? vec3(0.0) : Unclipped(ray, front);
+
   // SPEC 4.3.
   int left = 0;
   for (int i = 0; i < view_count; ++i) {
@@ -163,6 +185,9 @@ void main() {
     View view = views[i];
     vec4 colour = ColourAt(view, SourcePixel(view, PointInView(view, ray, fragment[i])));
     float share = (smallest + pixel_angle_rad) / (angle[i] + pixel_angle_rad), weight = share * share;
+    if (all(greaterThanEqual(unclipped, 0.75 * colour.rgb))) {  // SPEC 4.4: one surface
+      colour.rgb = mix(colour.rgb, unclipped, ClippedShare(view, colour.rgb));
+    }
     float factor = min(view.fading.y * colour.a + view.fading.z, 1.0);
 #if PER_PIXEL
     factor *= cut > 0.0 ? clamp((cut - angle[i]) / (0.25 * cut), kLeastFactor, 1.0) : 1.0;

@@ -6,7 +6,7 @@ struct View {
   vec4 depth_grid;  // fx, fy, cx, cy of the depth map, pixels
   vec4 codes;       // 1/z of measured code c: x + y c; of completed code c: z + w c
   vec4 slots;       // layer; 1 if the view has a mask; number of measured codes; a pixel of disparity (of 1/z)
-  vec4 fading;      // SPEC 1.4's factor, SPEC 4.8's gain and offset, unused
+  vec4 fading;      // SPEC 1.4's factor, SPEC 4.8's gain and offset, SPEC 4.4's clipped
 };
 
 vec3 Centre(View view) { return vec3(view.row_x.w, view.row_y.w, view.row_z.w); }
