@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "calib/bundle/one_place.h"
+#include "calib/bundle/one_position.h"
 #include "calib/bundle/refine.h"
 #include "calib/colmap/model_io.h"
 #include "cli/command.h"
@@ -40,7 +40,7 @@ void SayRefined(const calib::Refined& refined, Console& console) {
                     refined.points_dropped));
   }
   if (const std::string remark = calib::RemarkOn(refined); !remark.empty()) console.Say(remark);
-  if (const std::string line = calib::OnePlaceLine(refined.model); !line.empty()) console.Say(line);
+  if (const std::string line = calib::OnePositionLine(refined.model); !line.empty()) console.Say(line);
 }
 
 pipeline::RefinedInMetres HoldMetres(const CalibrateRefineArguments& options,

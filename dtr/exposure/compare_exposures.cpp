@@ -210,11 +210,11 @@ double MiddleOfDensest(std::vector<Weighted> values) {
   return middle;
 }
 
-/// The distance from `place` within which kDenseShare of the weight lies.
-double DenseRadius(const std::vector<Patch>& patches, const Vector3d& place) {
+/// The distance from `middle` within which kDenseShare of the weight lies.
+double DenseRadius(const std::vector<Patch>& patches, const Vector3d& middle) {
   std::vector<Weighted> distances;
   for (const Patch& patch : patches) {
-    distances.push_back({(patch.log_exposure - place).norm(), patch.weight});
+    distances.push_back({(patch.log_exposure - middle).norm(), patch.weight});
   }
   Sort(distances);
   const double wanted = kDenseShare * TotalOf(distances);
@@ -226,12 +226,12 @@ double DenseRadius(const std::vector<Patch>& patches, const Vector3d& place) {
   return distances.back().value;
 }
 
-Vector3d Biweight(const std::vector<Patch>& patches, Vector3d place, double reach) {
+Vector3d Biweight(const std::vector<Patch>& patches, Vector3d middle, double reach) {
   for (int step = 0; step < kLocationSteps; ++step) {
     Vector3d sum = Vector3d::Zero();
     double weights = 0;
     for (const Patch& patch : patches) {
-      const double u2 = (patch.log_exposure - place).squaredNorm() / (reach * reach);
+      const double u2 = (patch.log_exposure - middle).squaredNorm() / (reach * reach);
       if (u2 >= 1) continue;
       const double weight = patch.weight * (1 - u2) * (1 - u2);
       sum += weight * patch.log_exposure;
@@ -239,28 +239,28 @@ Vector3d Biweight(const std::vector<Patch>& patches, Vector3d place, double reac
     }
     if (!(weights > 0)) break;
     const Vector3d next = sum / weights;
-    const bool settled = (next - place).norm() < kSettled;
-    place = next;
+    const bool settled = (next - middle).norm() < kSettled;
+    middle = next;
     if (settled) break;
   }
-  return place;
+  return middle;
 }
 
 /// Where most of the patches lie. Highlights, and colours of other surfaces where depth is wrong,
 /// lie to one side and move a median by what they are; this hardly, as long as the right ones lie
 /// closest together. A patch that is off in one channel counts in none.
-Vector3d DensestPlace(const std::vector<Patch>& patches) {
-  Vector3d place;
+Vector3d DensestLogExposure(const std::vector<Patch>& patches) {
+  Vector3d middle;
   for (int c = 0; c < 3; ++c) {
     std::vector<Weighted> values;
     for (const Patch& patch : patches) values.push_back({patch.log_exposure[c], patch.weight});
-    place[c] = MiddleOfDensest(std::move(values));
+    middle[c] = MiddleOfDensest(std::move(values));
   }
   for (int step = 0; step < kScaleSteps; ++step) {
-    const double sigma = std::max(DenseRadius(patches, place) / kSigmasOfDense, kSettled);
-    place = Biweight(patches, place, kReachSigmas * sigma);
+    const double sigma = std::max(DenseRadius(patches, middle) / kSigmasOfDense, kSettled);
+    middle = Biweight(patches, middle, kReachSigmas * sigma);
   }
-  return place;
+  return middle;
 }
 
 }  // namespace
@@ -270,7 +270,7 @@ std::optional<ExposurePair> CompareExposures(std::span<const SmallView> views, i
       CommonPatches(views[static_cast<size_t>(a)], views[static_cast<size_t>(b)]);
   if (patches.size() < kMinPatches) return std::nullopt;
   const double weight = std::min(1.0, static_cast<double>(patches.size()) / kFullPatches);
-  return ExposurePair{a, b, weight, DensestPlace(patches)};
+  return ExposurePair{a, b, weight, DensestLogExposure(patches)};
 }
 
 }  // namespace dtr

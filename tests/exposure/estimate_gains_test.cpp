@@ -112,7 +112,7 @@ TEST(EstimateGains, HighlightsOfHalfTheWallChangeNothing) {
 
 // Of two photos of one exposure, a fifth and a quarter of the wall are brighter in the second, by
 // anything up to 60 %: highlights, and other surfaces where depth is wrong.
-TEST(EstimateGains, WhatIsBrighterFromOnePlaceAloneIsNoExposure) {
+TEST(EstimateGains, WhatIsBrighterFromOnePositionAloneIsNoExposure) {
   std::vector<View> views = Wall({{1, 1, 1}, {1, 1, 1}, {1, 1, 1}});
   Random random(5);
   const auto brighten = [&](View& view, int first, int end) {

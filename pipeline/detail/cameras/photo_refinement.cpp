@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "calib/bundle/one_place.h"
+#include "calib/bundle/one_position.h"
 #include "calib/bundle/refine.h"
 #include "calib/colmap/model_io.h"
 #include "dtr/base/delete.h"
@@ -112,7 +112,7 @@ PhotoRefinement WorkOut(const capture::Capture& capture, const CalibrateOptions&
     ShareFolders(capture, options, groups, !options.fixed_intrinsics, out, progress);
     progress.Stage("bundle adjustment", 0);
     RefineLenses(capture, options, RefineOptionsFor(options, progress), out);
-    if (std::string line = calib::OnePlaceLine(out.model); !line.empty()) {
+    if (std::string line = calib::OnePositionLine(out.model); !line.empty()) {
       out.notes.push_back(std::move(line));
     }
   }

@@ -161,7 +161,7 @@ TEST(RefineInMetres, GpsHoldsAWalkThatNoiseHasBentWhateverTheLensesAreAllowed) {
   }
 }
 
-TEST(RefineInMetres, BracketsOfOnePlaceConvergeWithTheirPlaces) {
+TEST(RefineInMetres, BracketsOfOnePositionConvergeWithTheirPositions) {
   const Bundle truth = MakeBundle(testing::Brackets());
   const Held held = Hold(Moved(testing::Perturbed(truth, 0.005)), Places(truth, 0.1));
   EXPECT_LT(OffM(held.refined.model, truth), 0.1);

@@ -7,7 +7,7 @@
 
 #include "calib/bundle/covariance.h"
 #include "calib/bundle/held_out.h"
-#include "calib/bundle/one_place.h"
+#include "calib/bundle/one_position.h"
 #include "calib/colmap/model_io.h"
 #include "calib/lens_groups.h"
 #include "calib/similarity.h"
@@ -225,7 +225,7 @@ TEST(Refine, SeparateLensesAreOnePerImage) {
   EXPECT_EQ(refined.model.cameras.size(), model.images.size());
 }
 
-TEST(Refine, BracketsOfOnePlaceConvergeAndHelpTheOthersNeitherMoreNorLess) {
+TEST(Refine, BracketsOfOnePositionConvergeAndHelpTheOthersNeitherMoreNorLess) {
   for (const double apart : {0.0, 1e-3, 0.1}) {
     const Bundle truth = MakeBundle(testing::Brackets(apart));
     const SfmModel model = ModelFrom(testing::Perturbed(truth, 0.01));
@@ -242,7 +242,7 @@ TEST(Refine, BracketsOfOnePlaceConvergeAndHelpTheOthersNeitherMoreNorLess) {
   }
 }
 
-// Exposure brackets of a drone: two photos from one place and four from another.
+// Exposure brackets of a drone: two photos from one position and four from another.
 TEST(Refine, TheFieldCasesBracketsConvergeAsItsOtherPhotosDo) {
   const auto folder = dtr::testing::DataFolder() / "field/brackets_no_convergence/model";
   DTR_REQUIRE_DATA(folder);
@@ -252,25 +252,25 @@ TEST(Refine, TheFieldCasesBracketsConvergeAsItsOtherPhotosDo) {
   EXPECT_LT(refined.solve.iterations, 100);
 }
 
-TEST(OnePlace, NamesThePhotosOfEachBracket) {
+TEST(OnePosition, NamesThePhotosOfEachBracket) {
   const SfmModel model = ModelFrom(MakeBundle(testing::Brackets()));
   const std::vector<std::vector<int>> expected{{5, 6}, {8, 9, 10, 11}};
-  EXPECT_EQ(ImagesOfOnePlace(model), expected);
+  EXPECT_EQ(ImagesOfOnePosition(model), expected);
   EXPECT_EQ(
-      OnePlaceLine(model),
+      OnePositionLine(model),
       "6 photos share 2 positions (exposure brackets, bursts): image105 + image106; image108 + "
       "image109 + image110 + image111");
-  EXPECT_EQ(OnePlaceLine(ModelFrom(MakeBundle(Noisy()))), "");
+  EXPECT_EQ(OnePositionLine(ModelFrom(MakeBundle(Noisy()))), "");
 }
 
-TEST(OnePlace, FramesOfASlowVideoShareNone) {
+TEST(OnePosition, FramesOfASlowVideoShareNone) {
   SceneSpec spec{.images = 12, .points = 400, .noise_px = 0.3};
   spec.point = testing::Walk().point;
   spec.pose = [](int i, int) {
     const Eigen::Vector3d centre(0.03 * i, 0, 2);  // of some 8.5 to what it sees
     return testing::bundle::LookAt(centre, centre + Eigen::Vector3d(0, 10, 0));
   };
-  EXPECT_TRUE(ImagesOfOnePlace(ModelFrom(MakeBundle(spec))).empty());
+  EXPECT_TRUE(ImagesOfOnePosition(ModelFrom(MakeBundle(spec))).empty());
 }
 
 TEST(Refine, TooFewPointsAreLeftAlone) {

@@ -169,17 +169,17 @@ inline void SolveOrNameIt(const Scene& scene, std::uint64_t seed, FaultInjection
   }
 }
 
-inline Scene FlatBoards(std::uint64_t seed, bool in_one_place) {
+inline Scene FlatBoards(std::uint64_t seed, bool of_one_position) {
   Scene scene;
   scene.cameras.push_back({"cam", BoardModel::kPinhole, TypicalCamera(BoardModel::kPinhole), {}});
   Random random(seed);
   for (size_t i = 0; i < 15; ++i) {
     Pose pose;
-    const double turn = in_one_place ? random.Uniform(-3, 3) : random.Uniform(-0.3, 0.3);
+    const double turn = of_one_position ? random.Uniform(-3, 3) : random.Uniform(-0.3, 0.3);
     const double tilt = random.Uniform(0, 3) * 3.14159 / 180;
     pose.rotation = Eigen::AngleAxisd(tilt, Eigen::Vector3d::UnitX()) *
                     Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ());
-    const double share = in_one_place ? 0 : 1;
+    const double share = of_one_position ? 0 : 1;
     pose.translation =
         Eigen::Vector3d(0.12 * share * random.Uniform(-1, 1), 0.08 * share * random.Uniform(-1, 1),
                         0.6 + 0.1 * share * random.Uniform(-1, 1)) -

@@ -1,4 +1,4 @@
-#include "calib/bundle/one_place.h"
+#include "calib/bundle/one_position.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -73,7 +73,7 @@ Distances SharedDistances(const SfmModel& model) {
 
 }  // namespace
 
-std::vector<std::vector<int>> ImagesOfOnePlace(const SfmModel& model) {
+std::vector<std::vector<int>> ImagesOfOnePosition(const SfmModel& model) {
   const auto centre = [&](int image) {
     return model.images[static_cast<size_t>(image)].cam_from_world.TargetOriginInSource();
   };
@@ -112,8 +112,8 @@ std::vector<std::vector<int>> ImagesOfOnePlace(const SfmModel& model) {
   return groups;
 }
 
-std::string OnePlaceLine(const SfmModel& model) {
-  const auto groups = ImagesOfOnePlace(model);
+std::string OnePositionLine(const SfmModel& model) {
+  const auto groups = ImagesOfOnePosition(model);
   if (groups.empty()) return "";
   std::vector<std::string> named;
   size_t photos = 0;
