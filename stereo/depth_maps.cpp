@@ -8,6 +8,7 @@
 #include "dtr/base/parallel_for.h"
 #include "stereo/left_out.h"
 #include "stereo/rounds.h"
+#include "stereo/side_by_side.h"
 #include "stereo/time_step.h"
 #include "stereo/widen.h"
 
@@ -58,22 +59,20 @@ class Run {
       RunRounds(Together(), needed, planes_, progress_);
     }
     progress_.Stage("depth", static_cast<int>(needed.size()));
-    // A view's pairs fill so many threads; with more, several views run side by side.
-    const int threads = ResolveThreads(options_.engine.threads);
-    const int side_by_side =
-        Alone() ? 1 : std::max(1, threads / std::max(1, options_.neighbours.count));
+    const int at_once = AtOnce(needed);
     const int without_planes_before = WithoutPlanes();
     size_t done = 0, next_wanted = 0;
     while (done < needed.size()) {
-      progress_.ThrowIfInterrupted();
-      const int batch = std::min(side_by_side, static_cast<int>(needed.size() - done));
-      EstimateBatch({needed.data() + done, static_cast<size_t>(batch)}, threads / batch);
-      done += static_cast<size_t>(batch);
-      while (next_wanted < wanted.size() && Ready(wanted[next_wanted])) {
-        const int view = wanted[next_wanted++];
+      const size_t batch = std::min(static_cast<size_t>(at_once), needed.size() - done);
+      EstimateBatch({needed.data() + done, batch});
+      done += batch;
+      const size_t first = next_wanted;
+      while (next_wanted < wanted.size() && Ready(wanted[next_wanted])) ++next_wanted;
+      ParallelFor(static_cast<int>(first), static_cast<int>(next_wanted), at_once, [&](int k) {
+        const int view = wanted[static_cast<size_t>(k)];
         on_view(view, Final(view), ranges_[static_cast<size_t>(view)]);
-        Release(view);
-      }
+      });
+      for (size_t k = first; k < next_wanted; ++k) Release(wanted[k]);
       progress_.Update(static_cast<int>(done));
     }
     if (const int without = WithoutPlanes() - without_planes_before; without > 0) {
@@ -83,10 +82,15 @@ class Run {
   }
 
  private:
-  /// One view at a time: stores and pages belong to one thread, and a limit is for one view.
-  bool Alone() const {
-    return engine_.Rounds() > 0 || options_.memory_bytes > 0 || options_.load_pixels != nullptr;
+  /// Of an engine that does not say what it takes one at a time within a limit; without one, as
+  /// many as threads are left over by a view's pairs.
+  int AtOnce(const std::vector<int>& views) {
+    const int at_once = ViewsAtOnce(Together(), views, Filters());
+    if (at_once > 1 || Limited()) return at_once;
+    return std::max(
+        1, ResolveThreads(options_.engine.threads) / std::max(1, options_.neighbours.count));
   }
+  bool Limited() const { return options_.memory_bytes > 0 || options_.load_pixels != nullptr; }
   bool IsOfPart(int view) const {
     return options_.part->part.Has(static_cast<size_t>(view), views_.size());
   }
@@ -145,24 +149,26 @@ class Run {
     return needed;
   }
 
-  void EstimateBatch(std::span<const int> batch, int threads_each) {
+  void EstimateBatch(std::span<const int> batch) {
     EngineOptions engine_options = options_.engine;
-    engine_options.threads = std::max(1, threads_each);
     engine_options.memory_gb /= static_cast<double>(batch.size());
-    const int at_once = static_cast<int>(batch.size());
-    std::vector<std::optional<DepthEstimate>> estimates(batch.size());
-    ParallelFor(0, at_once, at_once, [&](int i) {
+    std::vector<std::string> notes(batch.size());
+    const auto count = static_cast<int>(batch.size());
+    ParallelFor(0, count, count, [&](int i) {
+      progress_.ThrowIfInterrupted();
       const auto k = static_cast<size_t>(i);
-      estimates[k] = EstimateOne(batch[k], engine_options);
+      estimates_.Save(batch[k], EstimateOne(batch[k], engine_options, &notes[k]));
     });
-    for (size_t k = 0; k < batch.size(); ++k) estimates_.Save(batch[k], std::move(*estimates[k]));
+    for (const std::string& note : notes) {
+      if (!note.empty()) progress_.Note(note);
+    }
   }
 
   Collection Together() {
     return {views_, neighbours_, ranges_, &engine_, options_.engine, options_.load_pixels, &pages_};
   }
 
-  DepthEstimate EstimateOne(int view, const EngineOptions& engine_options) {
+  DepthEstimate EstimateOne(int view, const EngineOptions& engine_options, std::string* note) {
     const PinholeCamera& camera = views_[static_cast<size_t>(view)].camera;
     const auto holes = [&] {
       return DepthEstimate{DepthImage(camera.width_px(), camera.height_px()),
@@ -176,16 +182,15 @@ class Run {
                             ranges_[static_cast<size_t>(view)], around.maps(), engine_options);
     }
     if (NeighboursOf(view).empty()) {
-      progress_.Note("view " + std::to_string(view) + ": no neighbours, no depth");
+      *note = "view " + std::to_string(view) + ": no neighbours, no depth";
       return holes();
     }
     try {
-      std::optional<Room> room;
-      if (Alone()) room.emplace(Together(), view);
-      return engine_.Estimate(room ? room->views() : views_, view, NeighboursOf(view),
+      const Room room(Together(), view);
+      return engine_.Estimate(room.views(), view, NeighboursOf(view),
                               ranges_[static_cast<size_t>(view)], engine_options);
     } catch (const NoUsablePair& error) {
-      progress_.Note(std::string(error.what()) + ": no depth");
+      *note = std::string(error.what()) + ": no depth";
       return holes();
     }
   }

@@ -58,7 +58,8 @@ class NotEnoughMemory : public Error {
 };
 
 /// Computes the depth map of every view for which `already_done(view)` is false and hands it to
-/// `on_view`, in rising order of views, from the calling thread, as soon as it is final. A view
+/// `on_view` as soon as it is final: in rising order of views, but for those that become so at the
+/// same time, which are handed out side by side, from several threads. A view
 /// whose neighbours are not done depends on their unfiltered maps too; those are computed even if
 /// the neighbours' own results are done, so a resumed run gives the same bytes as an undisturbed
 /// one. With an engine that has rounds, all views go through one round before the next begins (see

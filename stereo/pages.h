@@ -1,11 +1,13 @@
 // stereo/pages.h -- what a run holds in memory, never more than a number of bytes.
 #pragma once
 #include <compare>
+#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <limits>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <string>
 
 namespace dtr::stereo {
@@ -20,7 +22,8 @@ struct PageKey {
 
 /// A cache of things that are loaded when they are wanted. Before it takes anything in, it lets go
 /// of what was used the longest ago and is not in use, so that what it holds and what is reserved
-/// for work never exceed the limit together. Used from one thread.
+/// for work never exceed the limit together. From any thread: who wants what another is loading
+/// waits for that.
 class Pages {
  public:
   explicit Pages(std::uint64_t limit_bytes = std::numeric_limits<std::uint64_t>::max())
@@ -35,14 +38,23 @@ class Pages {
   template <typename T>
   std::shared_ptr<const T> Get(const PageKey& key, std::uint64_t bytes,
                                const std::function<std::shared_ptr<const T>()>& load) {
-    if (const auto found = pages_.find(key); found != pages_.end()) {
+    std::unique_lock lock(mutex_);
+    for (auto found = pages_.find(key); found != pages_.end(); found = pages_.find(key)) {
       found->second.last_use = ++clock_;
-      return std::static_pointer_cast<const T>(found->second.content);
+      if (found->second.content) return std::static_pointer_cast<const T>(found->second.content);
+      loaded_.wait(lock);
     }
-    MakeRoom(kLoadingCopies * bytes);
-    std::shared_ptr<const T> content = load();
-    pages_[key] = {content, bytes, ++clock_};
-    Count(bytes);
+    Take(kLoadingCopies * bytes);
+    pages_[key] = {nullptr, kLoadingCopies * bytes, ++clock_};
+    lock.unlock();
+    std::shared_ptr<const T> content;
+    try {
+      content = load();
+    } catch (...) {
+      Loaded(key, nullptr, 0);
+      throw;
+    }
+    Loaded(key, content, bytes);
     return content;
   }
 
@@ -53,7 +65,7 @@ class Pages {
   class Reservation {
    public:
     Reservation(Pages& pages, std::uint64_t bytes);
-    ~Reservation() { pages_.held_ -= bytes_; }
+    ~Reservation();
     Reservation(const Reservation&) = delete;
     Reservation& operator=(const Reservation&) = delete;
 
@@ -68,13 +80,17 @@ class Pages {
 
  private:
   struct Page {
-    std::shared_ptr<const void> content;
+    std::shared_ptr<const void> content;  ///< null while it is loaded
     std::uint64_t bytes = 0;
     std::uint64_t last_use = 0;
   };
-  void MakeRoom(std::uint64_t bytes);
-  void Count(std::uint64_t bytes);
+  /// Makes room for bytes and counts them; with the lock.
+  void Take(std::uint64_t bytes);
+  /// Ends a page's loading; without content there is no page.
+  void Loaded(const PageKey& key, std::shared_ptr<const void> content, std::uint64_t bytes);
 
+  std::mutex mutex_;
+  std::condition_variable loaded_;
   std::map<PageKey, Page> pages_;
   std::uint64_t limit_, held_ = 0, peak_ = 0, clock_ = 0;
 };

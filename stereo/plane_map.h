@@ -2,6 +2,7 @@
 #pragma once
 #include <map>
 #include <memory>
+#include <mutex>
 #include <utility>
 
 #include "dtr/types/grid.h"
@@ -21,7 +22,8 @@ struct PlaneMap {
   bool operator==(const PlaneMap&) const = default;
 };
 
-/// Where the planes of a collection wait between rounds. Used from one thread.
+/// Where the planes of a collection wait between rounds. Any number of threads load and save, each
+/// planes of other views.
 class PlaneMapStore {
  public:
   virtual ~PlaneMapStore() = default;
@@ -37,18 +39,26 @@ class PlaneMapStore {
 /// Keeps everything in memory: 12 bytes per pixel, view and round.
 class PlaneMapsInMemory final : public PlaneMapStore {
  public:
-  bool Has(int round, int view) const override { return maps_.contains({round, view}); }
+  bool Has(int round, int view) const override {
+    const std::lock_guard lock(mutex_);
+    return maps_.contains({round, view});
+  }
   std::shared_ptr<const PlaneMap> Load(int round, int view) override {
+    const std::lock_guard lock(mutex_);
     return maps_.at({round, view});
   }
   void Save(int round, int view, PlaneMap&& map) override {
-    maps_[{round, view}] = std::make_shared<const PlaneMap>(std::move(map));
+    auto saved = std::make_shared<const PlaneMap>(std::move(map));
+    const std::lock_guard lock(mutex_);
+    maps_[{round, view}] = std::move(saved);
   }
   void Drop(int round) override {
+    const std::lock_guard lock(mutex_);
     std::erase_if(maps_, [&](const auto& entry) { return entry.first.first == round; });
   }
 
  private:
+  mutable std::mutex mutex_;
   std::map<std::pair<int, int>, std::shared_ptr<const PlaneMap>> maps_;
 };
 

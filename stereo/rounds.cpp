@@ -4,6 +4,7 @@
 #include <string>
 
 #include "dtr/base/error.h"
+#include "stereo/side_by_side.h"
 
 namespace dtr::stereo {
 namespace {
@@ -33,9 +34,9 @@ std::vector<std::vector<int>> Missing(const Collection& c, std::span<const int> 
   return missing;
 }
 
-PlaneMap First(const Collection& c, int view, Progress& progress) {
+PlaneMap First(const Collection& c, int view, std::string* note) {
   if (NeighboursOf(c, view).empty()) {
-    progress.Note("view " + std::to_string(view) + ": no neighbours, no depth");
+    *note = "view " + std::to_string(view) + ": no neighbours, no depth";
     return {};
   }
   try {
@@ -43,7 +44,7 @@ PlaneMap First(const Collection& c, int view, Progress& progress) {
     return c.engine->Match(room.views(), view, NeighboursOf(c, view),
                            c.ranges[static_cast<size_t>(view)], c.options);
   } catch (const NoUsablePair& error) {
-    progress.Note(std::string(error.what()) + ": no depth");
+    *note = std::string(error.what()) + ": no depth";
     return {};
   }
 }
@@ -111,13 +112,13 @@ void RunPass(const Collection& collection, std::span<const int> views, PlaneMapS
   if (pass > 0) RequirePass(collection, missing, store, pass - 1);
   progress.Stage(pass == 0 ? "matching" : "consistency pass " + std::to_string(pass),
                  static_cast<int>(missing.size()));
-  int done = 0;
-  for (const int view : missing) {
-    progress.ThrowIfInterrupted();
-    store.Save(pass, view,
-               pass == 0 ? First(collection, view, progress) : Next(collection, store, pass, view));
-    progress.Update(++done);
-  }
+  SideBySide(missing.size(), ViewsAtOnce(collection, missing, false), progress,
+             [&](size_t k, std::string* note) {
+               const int view = missing[k];
+               store.Save(
+                   pass, view,
+                   pass == 0 ? First(collection, view, note) : Next(collection, store, pass, view));
+             });
 }
 
 void RunRounds(const Collection& collection, std::span<const int> needed, PlaneMapStore& store,

@@ -51,8 +51,8 @@ class PlanesAround {
 
 /// Sees to it that `store` has the planes of the engine's last round for all `needed` views. A
 /// round of a view reads only the round before, so the order of views has no influence; what the
-/// store has already is not computed again. One view is worked on at a time, so memory beside the
-/// store is bounded by one view with its neighbours. A view without neighbours, or for which the
+/// store has already is not computed again. As many views are worked on at a time as the pages have
+/// room for (ViewsAtOnce), one always. A view without neighbours, or for which the
 /// engine finds no usable pair, gets empty planes and a note. Throws what the engine throws, and
 /// Interrupted between views.
 void RunRounds(const Collection& collection, std::span<const int> needed, PlaneMapStore& store,

@@ -1,7 +1,9 @@
 // stereo/view_paging.h -- what work on one view needs in memory, and nothing else.
 #pragma once
 #include <functional>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <vector>
 
@@ -16,10 +18,11 @@ struct StereoPixels {
   ImageRgb8 image;
   Mask mask;
 };
-/// Reads a view's pixels; called from the thread that called ComputeDepthMaps.
+/// Reads a view's pixels; called from several threads, for other views each.
 using PixelLoader = std::function<StereoPixels(int view)>;
 
-/// Where unfiltered depth maps wait until their neighbours are done. Used from one thread.
+/// Where unfiltered depth maps wait until their neighbours are done. Any number of threads load and
+/// save, each maps of other views.
 class EstimateStore {
  public:
   virtual ~EstimateStore() = default;
@@ -32,14 +35,26 @@ class EstimateStore {
 
 class EstimatesInMemory final : public EstimateStore {
  public:
-  bool Has(int view) const override { return estimates_.contains(view); }
-  std::shared_ptr<const DepthEstimate> Load(int view) override { return estimates_.at(view); }
-  void Save(int view, DepthEstimate&& estimate) override {
-    estimates_[view] = std::make_shared<const DepthEstimate>(std::move(estimate));
+  bool Has(int view) const override {
+    const std::lock_guard lock(mutex_);
+    return estimates_.contains(view);
   }
-  void Drop(int view) override { estimates_.erase(view); }
+  std::shared_ptr<const DepthEstimate> Load(int view) override {
+    const std::lock_guard lock(mutex_);
+    return estimates_.at(view);
+  }
+  void Save(int view, DepthEstimate&& estimate) override {
+    auto saved = std::make_shared<const DepthEstimate>(std::move(estimate));
+    const std::lock_guard lock(mutex_);
+    estimates_[view] = std::move(saved);
+  }
+  void Drop(int view) override {
+    const std::lock_guard lock(mutex_);
+    estimates_.erase(view);
+  }
 
  private:
+  mutable std::mutex mutex_;
   std::map<int, std::shared_ptr<const DepthEstimate>> estimates_;
 };
 

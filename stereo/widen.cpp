@@ -2,7 +2,9 @@
 
 #include <algorithm>
 
+#include "dtr/base/parallel_for.h"
 #include "dtr/types/area_average.h"
+#include "stereo/side_by_side.h"
 
 namespace dtr::stereo {
 namespace {
@@ -14,15 +16,26 @@ constexpr double kSuspiciousShare = 0.01;
 constexpr double kNearStep = 1.5, kFarStep = 2.0;
 
 std::vector<SmallView> SmallViews(const Collection& c, Progress& progress) {
-  std::vector<SmallView> small;
+  std::vector<SmallView> small(c.views.size());
   progress.Stage("depth ranges", static_cast<int>(c.views.size()));
-  for (int v = 0; v < static_cast<int>(c.views.size()); ++v) {
+  std::uint64_t largest = 1;
+  for (const StereoView& view : c.views) largest = std::max(largest, PixelBytes(view.camera));
+  const std::uint64_t fit = c.pages->limit() / (Pages::kLoadingCopies * largest);
+  const int at_once = static_cast<int>(std::clamp<std::uint64_t>(
+      fit, 1, static_cast<std::uint64_t>(ResolveThreads(c.options.threads))));
+  ParallelFor(0, static_cast<int>(c.views.size()), at_once, [&](int v) {
     progress.ThrowIfInterrupted();
     const ViewsAround alone(c.views, c.load_pixels, *c.pages, v, {});
     const StereoView& view = alone.views()[static_cast<size_t>(v)];
-    small.push_back(Shrink(view, LookSide(view.camera)));
-  }
+    small[static_cast<size_t>(v)] = Shrink(view, LookSide(view.camera));
+  });
   return small;
+}
+
+/// The small images are all in memory, and what an engine takes for one is little.
+int LooksAtOnce(const Collection& c, std::span<const StereoView> views) {
+  const bool says = !views.empty() && c.engine->WorkBytes(views, 0, c.neighbours[0].views) > 0;
+  return says ? ResolveThreads(c.options.threads) : 1;
 }
 
 /// Moves the ends that too many depths lie at; false when there is none.
@@ -93,9 +106,9 @@ std::vector<DepthRange> Widened(const Collection& c, int most, Progress& progres
   }
   EngineOptions options = c.options;
   options.look = true;
-  for (size_t v = 0; v < views.size(); ++v) {
+  SideBySide(views.size(), LooksAtOnce(c, views), progress, [&](size_t v, std::string*) {
     std::span<const int> neighbours = c.neighbours[v].views;
-    if (neighbours.empty()) continue;
+    if (neighbours.empty()) return;
     neighbours = neighbours.first(std::min<size_t>(neighbours.size(), kLookNeighbours));
     try {
       for (int step = 0; step < most; ++step) {
@@ -107,8 +120,7 @@ std::vector<DepthRange> Widened(const Collection& c, int most, Progress& progres
     } catch (const NoUsablePair&) {
       // The run itself will say so.
     }
-    progress.Update(static_cast<int>(v) + 1);
-  }
+  });
   if (const std::string summary = Summary(c.ranges, ranges); !summary.empty()) {
     progress.Note(summary);
   }

@@ -2,8 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <chrono>
+#include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
+
+#include "dtr/base/parallel_for.h"
 
 namespace dtr::stereo {
 namespace {
@@ -67,6 +73,28 @@ TEST_F(PagesTest, DroppedPagesAreLoadedAnew) {
   Get(pages, 1);
   Get(pages, 0);
   EXPECT_EQ(loaded, std::vector<int>{0});
+}
+
+TEST_F(PagesTest, SeveralThreadsLoadAPageOnceAndWhatFailedAgain) {
+  Pages pages(1000);
+  std::atomic<int> loads{0}, failures{0};
+  const auto get = [&](int i) {
+    const int view = i % 5;
+    try {
+      const auto page = pages.Get<int>({PageKey::Kind::kPixels, 0, view}, 10, [&] {
+        if (loads++ == 0) throw std::runtime_error("the first one fails");
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+        return std::make_shared<const int>(view);
+      });
+      EXPECT_EQ(*page, view);
+    } catch (const std::runtime_error&) {
+      ++failures;
+    }
+  };
+  ParallelFor(0, 40, 8, get);
+  EXPECT_EQ(failures, 1);
+  EXPECT_EQ(loads, 6);
+  EXPECT_EQ(pages.held(), 50u);
 }
 
 }  // namespace
