@@ -10,6 +10,7 @@
 #include "cli/standard_output.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/base/trace.h"
 #include "pipeline/depth_settings.h"
 
 namespace dtr::cli {
@@ -90,19 +91,27 @@ void AddCommand(CLI::App& app, const std::string& name, const std::string& descr
       ->check(CLI::Range(0, 1024))
       ->type_name("N");
   command->add_option("--seed", common->seed, "Seed of everything random")->type_name("N");
+  auto trace_file = std::make_shared<std::string>();
+  command
+      ->add_option("--trace", *trace_file,
+                   "Write what each thread did when as Trace Events, for ui.perfetto.dev and "
+                   "scripts/scaling")
+      ->type_name("FILE");
   const Action action = prepare(*command);
   if (command->get_option_no_throw("--force") == nullptr) {
     command->add_flag("--force", common->force, "Replace output files that exist");
   }
   RejectWhatIsNoNumber(*command);
   // The exit code leaves through CLI::RuntimeError, CLI11's way of ending with a code of one's own.
-  command->callback([command, common, action] {
+  command->callback([command, common, action, trace_file] {
     RequireOutputs(*command, command->count("--force") > 0);
     const CalledApp* const called = CallerOf(*command);
     if (called != nullptr) common->json_text = &called->json();
     Console console =
         called != nullptr ? Console(called->caller()) : Console(common->json_target == "-");
+    if (!trace_file->empty()) trace::Begin();
     const int code = action(Context{*common, console});
+    if (!trace_file->empty()) WriteFileAtomically(*trace_file, trace::End());
     if (code != kDone) throw CLI::RuntimeError(code);
   });
 }

@@ -11,6 +11,7 @@
 #include "cli/option_names.h"
 #include "cli/standard_output.h"
 #include "dtr/base/machine.h"
+#include "dtr/base/trace.h"
 
 namespace dtr::cli {
 namespace {
@@ -66,6 +67,7 @@ Console::~Console() {
 }
 
 void Console::Stage(const std::string& name, int total) {
+  trace::Stage(name);
   if (caller_ != nullptr) return caller_->Stage(name, total);
   const std::lock_guard lock(mutex_);
   FinishStage();

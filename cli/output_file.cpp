@@ -52,7 +52,7 @@ namespace {
 // input.
 constexpr std::array kOutputOptions{"--json",         "--output",     "-o",       "--depth-out",
                                     "--coverage-out", "--screenshot", "--report", "--normals",
-                                    "--state-file",   "--pictures"};
+                                    "--state-file",   "--pictures",   "--trace"};
 
 constexpr char kSetFile[] = "set.json", kPageFile[] = "index.html";
 
@@ -138,10 +138,10 @@ void RequireOutputs(const CLI::App& command, bool force) {
                         [](const Output& output) { return output.option != "--json"; });
   std::map<fs::path, std::string> named;
   for (const Output& output : paths.outputs) {
-    if (output.option == "--json") {
-      RequireFolderOf(output.path, "--json");
+    if (output.option == "--json" || output.option == "--trace") {
+      RequireFolderOf(output.path, output.option);
       if (fs::is_directory(output.path)) {
-        throw UsageError("--json " + output.path.string() +
+        throw UsageError(output.option + " " + output.path.string() +
                          ": expected a file name, found a folder");
       }
     }

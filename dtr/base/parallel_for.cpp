@@ -4,6 +4,7 @@
 #include <thread>
 
 #include "dtr/base/thread_pool.h"
+#include "dtr/base/trace.h"
 
 namespace dtr {
 
@@ -20,8 +21,11 @@ void ParallelFor(int begin, int end, int threads, const std::function<void(int)>
     for (int i = begin; i < end; ++i) body(i);
     return;
   }
-  Loop loop(begin, end, limit, request, body, ThreadPool::Current());
-  ThreadPool::OfProcess().Run(loop);
+  const auto run = [&](const std::function<void(int)>& of_item) {
+    Loop loop(begin, end, limit, request, of_item, ThreadPool::Current());
+    ThreadPool::OfProcess().Run(loop);
+  };
+  trace::IsOn() ? trace::Loop(limit, body, run) : run(body);
 }
 
 }  // namespace dtr
