@@ -91,7 +91,7 @@ TEST_F(Traced, ABuildWouldUseSixteenCores) {
 TEST_F(Traced, AFileThatCannotBeIsNamedBeforeTheWork) {
   ExpectRejected(Dtr({"info", (*folder_ / "no.dtr").string(), "--trace",
                       (*folder_ / "no/trace.json").string()}),
-                 kWrongUsage, "--trace");
+                 kWrongUsage, "expected an existing folder to write into, found nothing");
 }
 
 }  // namespace
