@@ -1,4 +1,5 @@
-// calib/bundle/one_position.h -- photos that were taken from one position: exposure brackets, bursts.
+// calib/bundle/one_position.h -- photos that were taken from one position: exposure brackets,
+// bursts.
 #pragma once
 #include <string>
 #include <vector>

@@ -40,7 +40,8 @@ void SayRefined(const calib::Refined& refined, Console& console) {
                     refined.points_dropped));
   }
   if (const std::string remark = calib::RemarkOn(refined); !remark.empty()) console.Say(remark);
-  if (const std::string line = calib::OnePositionLine(refined.model); !line.empty()) console.Say(line);
+  if (const std::string line = calib::OnePositionLine(refined.model); !line.empty())
+    console.Say(line);
 }
 
 pipeline::RefinedInMetres HoldMetres(const CalibrateRefineArguments& options,
