@@ -22,7 +22,7 @@ struct PlaneMap {
   bool operator==(const PlaneMap&) const = default;
 };
 
-/// Where the planes of a collection wait between rounds. Any number of threads load and save, each
+/// Where the planes of a collection wait between passes. Any number of threads load and save, each
 /// planes of other views.
 class PlaneMapStore {
  public:

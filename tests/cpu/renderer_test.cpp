@@ -326,7 +326,7 @@ TEST(Render, WhatAPhotoClippedIsNoColourWhereAnotherMeasuredOne) {
       for (int c = 0; c < 3; ++c) EXPECT_NEAR(result.image(48, 36, c), wall, 2);
     }
   }
-  // At its own place the clipped photo is shown as it is.
+  // From its own position the clipped photo is shown as it is.
   const View& clipped = set.frames[0].views[1];
   const RenderResult own =
       Render(scene, clipped.camera, clipped.cam_from_world, OptionsOf(RenderMethod::kDeferred));
