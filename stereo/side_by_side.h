@@ -14,7 +14,8 @@ namespace dtr::stereo {
 int ViewsAtOnce(const Collection& collection, std::span<const int> views, bool filters);
 
 /// Calls `body(k, &note)` for every k in [0, count), so many at a time, and counts them in the
-/// stage that runs. The notes are passed on in their order once all are done; Interrupted between items.
+/// stage that runs. The notes are passed on in their order once all are done; Interrupted between
+/// items.
 void SideBySide(size_t count, int at_once, Progress& progress,
                 const std::function<void(size_t k, std::string* note)>& body);
 
