@@ -1,10 +1,10 @@
 #include "stereo/side_by_side.h"
 
 #include <algorithm>
-#include <mutex>
 #include <string>
 #include <vector>
 
+#include "dtr/base/counted_for.h"
 #include "dtr/base/parallel_for.h"
 
 namespace dtr::stereo {
@@ -26,14 +26,8 @@ int ViewsAtOnce(const Collection& c, std::span<const int> views, bool filters) {
 void SideBySide(size_t count, int at_once, Progress& progress,
                 const std::function<void(size_t k, std::string* note)>& body) {
   std::vector<std::string> notes(count);
-  std::mutex mutex;
-  int done = 0;
-  ParallelFor(0, static_cast<int>(count), at_once, [&](int k) {
-    progress.ThrowIfInterrupted();
-    body(static_cast<size_t>(k), &notes[static_cast<size_t>(k)]);
-    const std::lock_guard lock(mutex);  // the count reported only grows
-    progress.Update(++done);
-  });
+  CountedFor(static_cast<int>(count), at_once, progress,
+             [&](int k) { body(static_cast<size_t>(k), &notes[static_cast<size_t>(k)]); });
   for (const std::string& note : notes) {
     if (!note.empty()) progress.Note(note);
   }

@@ -1,8 +1,8 @@
 #include "pipeline/detail/run/side_by_side.h"
 
 #include <algorithm>
-#include <mutex>
 
+#include "dtr/base/counted_for.h"
 #include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
 
@@ -38,14 +38,11 @@ void SideBySide(size_t count, const std::string& stage, const Room& room,
   if (room_bytes > 0) {
     threads = static_cast<int>(std::clamp(room_bytes / largest_bytes, 1.0, 1.0 * threads));
   }
-  std::mutex mutex;
-  int done = 0;
+  const auto of_item = [&](int k) { body(static_cast<size_t>(k)); };
+  if (!stage.empty()) return CountedFor(static_cast<int>(count), threads, progress, of_item);
   ParallelFor(0, static_cast<int>(count), threads, [&](int k) {
     progress.ThrowIfInterrupted();
-    body(static_cast<size_t>(k));
-    if (stage.empty()) return;
-    const std::lock_guard lock(mutex);  // the count reported only grows
-    progress.Update(++done);
+    of_item(k);
   });
 }
 
