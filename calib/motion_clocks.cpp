@@ -182,7 +182,7 @@ std::optional<PairShift> ShiftOfPair(const MotionSeen& a, const MotionSeen& b,
   return PeakOf(scores);
 }
 
-std::vector<PairShift> ShiftsOfPairs(const std::vector<MotionSeen>& cameras, int threads) {
+std::vector<PairShift> ShiftsOfPairs(const std::vector<MotionSeen>& cameras) {
   std::vector<std::vector<Eigen::Vector3d>> rays;
   for (const MotionSeen& camera : cameras) rays.push_back(RaysOf(camera));
   std::vector<std::pair<size_t, size_t>> pairs;
@@ -190,7 +190,7 @@ std::vector<PairShift> ShiftsOfPairs(const std::vector<MotionSeen>& cameras, int
     for (size_t b = a + 1; b < cameras.size(); ++b) pairs.emplace_back(a, b);
   }
   std::vector<std::optional<PairShift>> found(pairs.size());
-  ParallelFor(0, static_cast<int>(pairs.size()), threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(pairs.size()), [&](int i) {
     const auto [a, b] = pairs[static_cast<size_t>(i)];
     auto& shift = found[static_cast<size_t>(i)];
     shift = ShiftOfPair(cameras[a], cameras[b], rays[a], rays[b]);
@@ -281,9 +281,9 @@ void RequireMotion(const std::vector<MotionSeen>& cameras) {
 
 }  // namespace
 
-std::vector<MotionClock> FindMotionClocks(const std::vector<MotionSeen>& cameras, int threads) {
+std::vector<MotionClock> FindMotionClocks(const std::vector<MotionSeen>& cameras) {
   RequireMotion(cameras);
-  const std::vector<PairShift> shifts = ShiftsOfPairs(cameras, threads);
+  const std::vector<PairShift> shifts = ShiftsOfPairs(cameras);
   const auto by_best = ByBestPairs(shifts, cameras.size(), 0);
   RequireAllJoined(shifts, by_best, cameras);
   std::vector<PairShift> agreeing;

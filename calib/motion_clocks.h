@@ -37,7 +37,7 @@ struct MotionClock {
 /// The same for any number of threads. Throws Error naming a camera that shares no unambiguous
 /// motion with the others (nothing moved, it moved periodically, or clocks are farther apart), and
 /// std::invalid_argument for fewer than two cameras or sizes that differ.
-std::vector<MotionClock> FindMotionClocks(const std::vector<MotionSeen>& cameras, int threads);
+std::vector<MotionClock> FindMotionClocks(const std::vector<MotionSeen>& cameras);
 inline constexpr int kFewestFrames = 8;
 
 }  // namespace dtr::calib

@@ -102,12 +102,12 @@ UndistortedPhoto AsItIs(const ImageRgb8& photo, const Mask& usable, const LensCa
 }
 
 UndistortedPhoto UndistortFullSize(const ImageRgb8& photo, const Mask& usable,
-                                   const LensCamera& lens, const PinholeCamera& onto, int threads) {
+                                   const LensCamera& lens, const PinholeCamera& onto) {
   const LensMap map(lens);
   const int width = photo.width(), height = photo.height();
   UndistortedPhoto out{ImageRgb8(width, height, 3), Mask(width, height), onto};
   std::atomic<bool> anything_missing{false};
-  ParallelFor(0, height, threads, [&](int y) {
+  ParallelFor(0, height, [&](int y) {
     bool missing = false;
     for (int x = 0; x < width; ++x) {
       const auto pixel = map.PixelFromCam(out.camera.RayFromPixel({x + 0.5, y + 0.5}));
@@ -139,18 +139,17 @@ void Shrink(UndistortedPhoto& photo, const PinholeCamera& camera) {
 
 }  // namespace
 
-UndistortedPhoto Undistort(const ImageRgb8& photo, const LensCamera& lens, int max_size_px,
-                           int threads) {
-  return Undistort(photo, {}, lens, max_size_px, threads);
+UndistortedPhoto Undistort(const ImageRgb8& photo, const LensCamera& lens, int max_size_px) {
+  return Undistort(photo, {}, lens, max_size_px);
 }
 
 UndistortedPhoto Undistort(const ImageRgb8& photo, const Mask& usable, const LensCamera& lens,
-                           int max_size_px, int threads) {
-  return Undistort(photo, usable, lens, lens.Pinhole(), max_size_px, threads);
+                           int max_size_px) {
+  return Undistort(photo, usable, lens, lens.Pinhole(), max_size_px);
 }
 
 UndistortedPhoto Undistort(const ImageRgb8& photo, const Mask& usable, const LensCamera& lens,
-                           const PinholeCamera& onto, int max_size_px, int threads) {
+                           const PinholeCamera& onto, int max_size_px) {
   lens.Check();
   if (!usable.empty() && (usable.width() != photo.width() || usable.height() != photo.height())) {
     throw std::invalid_argument("Undistort: mask and photo differ in size");
@@ -167,7 +166,7 @@ UndistortedPhoto Undistort(const ImageRgb8& photo, const Mask& usable, const Len
   }
   UndistortedPhoto out = lens.IsUndistorted() && onto == lens.Pinhole()
                              ? AsItIs(photo, usable, lens)
-                             : UndistortFullSize(photo, usable, lens, onto, threads);
+                             : UndistortFullSize(photo, usable, lens, onto);
   const PinholeCamera shrunk = ShrunkCamera(onto, max_size_px);
   if (!(shrunk == onto)) Shrink(out, shrunk);
   return out;

@@ -29,16 +29,15 @@ struct UndistortedPhoto {
 /// needed against aliasing. Works on stored sRGB values. The same bytes for any number of threads
 /// (0: all cores). Throws Error when the photo has not the size the lens was calibrated for,
 /// std::invalid_argument when the lens is impossible.
-UndistortedPhoto Undistort(const ImageRgb8& photo, const LensCamera& lens, int max_size_px,
-                           int threads);
+UndistortedPhoto Undistort(const ImageRgb8& photo, const LensCamera& lens, int max_size_px);
 /// The same for a photo of which only part may be used (`usable` not 0; empty: all): pixels whose
 /// value lies between others that may not be used are masked too.
 UndistortedPhoto Undistort(const ImageRgb8& photo, const Mask& usable, const LensCamera& lens,
-                           int max_size_px, int threads);
+                           int max_size_px);
 /// The same, drawn as the camera `onto` would have taken it, which has the photo's size: photos
 /// that a stabiliser shifted against each other become those of one camera.
 UndistortedPhoto Undistort(const ImageRgb8& photo, const Mask& usable, const LensCamera& lens,
-                           const PinholeCamera& onto, int max_size_px, int threads);
+                           const PinholeCamera& onto, int max_size_px);
 
 /// The camera that Undistort gives a photo drawn as `onto` would have taken it, without a photo.
 PinholeCamera ShrunkCamera(const PinholeCamera& onto, int max_size_px);

@@ -269,7 +269,7 @@ Capture IngestPhotos(const fs::path& folder, const IngestOptions& options, Progr
   std::vector<std::vector<std::string>> remarks(listing.photos.size());
   std::atomic<int> done{0};
   MemoryBudget memory(options.memory_gb);
-  ParallelFor(0, count, options.threads, [&](int i) {
+  ParallelFor(0, count, [&](int i) {
     progress.ThrowIfInterrupted();
     const auto index = static_cast<size_t>(i);
     const std::string& name = listing.photos[index];

@@ -16,7 +16,6 @@ struct IngestOptions {
   bool sort = true;
   /// Decode every photo: finds damaged ones now instead of hours later, and measures the rest.
   bool screen = true;
-  int threads = 0;  ///< 0: all cores
   /// Photos in memory at a time take at most so many 1e9 bytes, and one that alone takes more is
   /// skipped; 0: no bound.
   double memory_gb = 0;

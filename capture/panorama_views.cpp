@@ -86,14 +86,13 @@ int SamplesOf(const Panorama& panorama, const PinholeCamera& camera,
 }  // namespace
 
 PanoramaView ViewOfPanorama(const ImageRgb8& image, const Mask& usable, const Panorama& panorama,
-                            const PinholeCamera& camera, const Eigen::Matrix3d& cam_from_panorama,
-                            int threads) {
+                            const PinholeCamera& camera, const Eigen::Matrix3d& cam_from_panorama) {
   const Eigen::Matrix3d panorama_from_cam = cam_from_panorama.transpose();
   const Sampler sampler(image, usable, panorama);
   PanoramaView view{ImageRgb8(camera.width_px(), camera.height_px(), 3),
                     Mask(camera.width_px(), camera.height_px(), 1, 255)};
   std::atomic<bool> all_usable{true};
-  ParallelFor(0, camera.height_px(), threads, [&](int y) {
+  ParallelFor(0, camera.height_px(), [&](int y) {
     for (int x = 0; x < camera.width_px(); ++x) {
       const int n = SamplesOf(panorama, camera, panorama_from_cam, {x + 0.5, y + 0.5});
       Vector3d sum = Vector3d::Zero();

@@ -18,7 +18,6 @@ struct PanoramaView {
 /// all that it is made of is; its colours are those of the nearest pixels elsewhere. The same bytes
 /// for any number of threads.
 PanoramaView ViewOfPanorama(const ImageRgb8& image, const Mask& usable, const Panorama& panorama,
-                            const PinholeCamera& camera, const Eigen::Matrix3d& cam_from_panorama,
-                            int threads);
+                            const PinholeCamera& camera, const Eigen::Matrix3d& cam_from_panorama);
 
 }  // namespace dtr::capture

@@ -83,13 +83,13 @@ void PreparePhoto(const Photo& photo, const fs::path& to, int max_size_px) {
 
 }  // namespace
 
-void PrepareSfmImages(const Capture& capture, const fs::path& folder, int max_size_px, int threads,
+void PrepareSfmImages(const Capture& capture, const fs::path& folder, int max_size_px,
                       double memory_gb, Progress& progress) {
   const int count = static_cast<int>(capture.photos.size());
   progress.Stage("photos for calibration", count);
   std::atomic<int> done{0};
   MemoryBudget memory(memory_gb);
-  ParallelFor(0, count, threads, [&](int i) {
+  ParallelFor(0, count, [&](int i) {
     progress.ThrowIfInterrupted();
     const Photo& photo = capture.photos[static_cast<size_t>(i)];
     const auto share = memory.Take(MemoryOf(photo));
@@ -104,10 +104,9 @@ fs::path SfmMaskFile(const fs::path& folder, const Photo& photo) {
   return fs::path(folder.string() + ".masks") / (photo.name + ".png");
 }
 
-void PrepareSfmImages(const Capture& capture, const fs::path& folder, int max_size_px,
-                      int threads) {
+void PrepareSfmImages(const Capture& capture, const fs::path& folder, int max_size_px) {
   SilentProgress silent;
-  PrepareSfmImages(capture, folder, max_size_px, threads, 0, silent);
+  PrepareSfmImages(capture, folder, max_size_px, 0, silent);
 }
 
 }  // namespace dtr::capture

@@ -19,10 +19,9 @@ namespace dtr::capture {
 /// Photos in memory at a time take at most `memory_gb` (GB of 1e9 bytes; 0: no bound; one may be
 /// larger). Throws Error when a photo cannot be read or a file cannot be written.
 void PrepareSfmImages(const Capture& capture, const std::filesystem::path& folder, int max_size_px,
-                      int threads, double memory_gb, Progress& progress);
+                      double memory_gb, Progress& progress);
 /// The same without progress and bound.
-void PrepareSfmImages(const Capture& capture, const std::filesystem::path& folder, int max_size_px,
-                      int threads);
+void PrepareSfmImages(const Capture& capture, const std::filesystem::path& folder, int max_size_px);
 
 /// Where PrepareSfmImages(..., folder, ...) puts the mask of a photo; empty for one without.
 std::filesystem::path SfmMaskFile(const std::filesystem::path& folder, const Photo& photo);

@@ -59,14 +59,14 @@ Photo PhotoOfFace(const Photo& panorama, const PanoramaFace& face, int size_px) 
 
 // The views of one panorama, written; those without a usable pixel are listed in `left_out`.
 std::vector<Photo> Split(const Photo& panorama, const std::vector<PanoramaFace>& faces, int size_px,
-                         const fs::path& folder, int threads, std::vector<Skipped>& left_out) {
+                         const fs::path& folder, std::vector<Skipped>& left_out) {
   const PhotoPixels pixels = ReadPhotoAndMask(panorama);
   const Panorama sphere = PanoramaOf(panorama);
   const PinholeCamera camera = FaceCamera(size_px);
   std::vector<Photo> photos;
   for (const PanoramaFace& face : faces) {
     const PanoramaView view =
-        ViewOfPanorama(pixels.image, pixels.mask, sphere, camera, face.cam_from_panorama, threads);
+        ViewOfPanorama(pixels.image, pixels.mask, sphere, camera, face.cam_from_panorama);
     Photo photo = PhotoOfFace(panorama, face, size_px);
     const auto& mask = view.mask.data();
     if (!mask.empty() && std::all_of(mask.begin(), mask.end(), [](auto m) { return m == 0; })) {
@@ -216,8 +216,7 @@ bool ArePanoramas(Capture& capture, PanoramaUse use, Progress* progress) {
   return panorama != nullptr;
 }
 
-Capture SplitPanoramas(const Capture& capture, const fs::path& folder, int threads,
-                       Progress& progress) {
+Capture SplitPanoramas(const Capture& capture, const fs::path& folder, Progress& progress) {
   const std::vector<PanoramaFace> faces = PanoramaFaces();
   double widest = 0;
   std::map<std::string, const Photo*> by_name;
@@ -236,7 +235,7 @@ Capture SplitPanoramas(const Capture& capture, const fs::path& folder, int threa
   int done = 0;
   for (const Photo& panorama : capture.photos) {
     progress.ThrowIfInterrupted();
-    for (Photo& photo : Split(panorama, faces, size_px, folder, threads, views.skipped)) {
+    for (Photo& photo : Split(panorama, faces, size_px, folder, views.skipped)) {
       photo.screening = ScreeningOf(panorama, FaceCalled(photo.face->face), by_name);
       views.photos.push_back(std::move(photo));
     }

@@ -16,9 +16,9 @@ enum class PanoramaUse {
 };
 
 /// Whether the photos are panoramas to be split. With kAuto, where fewer than half as many photos
-/// are of one kind as of the other, these are moved to `capture.skipped`, and `progress` has a note.
-/// Throws Error where some are panoramas and about as many are not, and where one's size is not
-/// that of an equirectangular panorama. Adds remarks where photos are twice as wide as high, or
+/// are of one kind as of the other, these are moved to `capture.skipped`, and `progress` has a
+/// note. Throws Error where some are panoramas and about as many are not, and where one's size is
+/// not that of an equirectangular panorama. Adds remarks where photos are twice as wide as high, or
 /// state another projection, and are taken as they are.
 bool ArePanoramas(Capture& capture, PanoramaUse use, Progress* progress = nullptr);
 
@@ -30,7 +30,7 @@ Panorama PanoramaOf(const Photo& photo);
 /// panorama (FaceSizePx). Masks and alpha of a panorama are split with it; a view that has no
 /// usable pixel is left out and listed. What screening said of a panorama it says of its views.
 /// Deterministic. Throws Error where a panorama cannot be read. `capture` as of ArePanoramas.
-Capture SplitPanoramas(const Capture& capture, const std::filesystem::path& folder, int threads,
+Capture SplitPanoramas(const Capture& capture, const std::filesystem::path& folder,
                        Progress& progress);
 
 }  // namespace dtr::capture

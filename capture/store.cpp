@@ -169,7 +169,7 @@ void CaptureWriter::Write(const Capture& capture, Progress& progress) {
   stored.photos.resize(capture.photos.size());
   std::atomic<int> done{0};
   MemoryBudget memory(state_->options.memory_gb);
-  ParallelFor(0, count, state_->options.threads, [&](int i) {
+  ParallelFor(0, count, [&](int i) {
     progress.ThrowIfInterrupted();
     const auto index = static_cast<size_t>(i);
     const auto share = memory.Take(MemoryOf(capture.photos[index]));
@@ -186,9 +186,9 @@ void WriteCapture(const Capture& capture, const fs::path& folder, const StoreOpt
   CaptureWriter(folder, options).Write(capture, progress);
 }
 
-void WriteCapture(const Capture& capture, const fs::path& folder, int threads) {
+void WriteCapture(const Capture& capture, const fs::path& folder) {
   SilentProgress silent;
-  WriteCapture(capture, folder, {.threads = threads}, silent);
+  WriteCapture(capture, folder, {}, silent);
 }
 
 Capture ReadCapture(const fs::path& folder) {

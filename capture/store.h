@@ -24,7 +24,6 @@ inline constexpr char kFramesFolder[] = "frames";
 
 struct StoreOptions {
   bool replace = false;  ///< an earlier capture in the folder may be replaced
-  int threads = 0;       ///< 0: all cores
   double memory_gb = 0;  ///< of photos in memory at a time, as for IngestPhotos; 0: no bound
 };
 
@@ -56,7 +55,7 @@ class CaptureWriter {
 void WriteCapture(const Capture& capture, const std::filesystem::path& folder,
                   const StoreOptions& options, Progress& progress);
 /// The same without progress.
-void WriteCapture(const Capture& capture, const std::filesystem::path& folder, int threads);
+void WriteCapture(const Capture& capture, const std::filesystem::path& folder);
 
 /// Reads what WriteCapture wrote; `Photo::file` are the upright photos. Checks the list, not the
 /// photos' bytes. Throws Error naming file and field where something is not as it must be.

@@ -149,7 +149,6 @@ void AddBuildOptions(CLI::App& command, BuildArguments& arguments) {
 void FinishBuildArguments(const CommonOptions& common, BuildArguments& arguments) {
   pipeline::BuildOptions& options = arguments.options;
   options.metres = MetreOptionsFrom(options.metres.gps, arguments.metre_words);
-  options.threads = common.threads;
   options.seed = common.seed;
   options.part = PartFrom(arguments);
   arguments.dynamic.temporal = arguments.temporal == "on";

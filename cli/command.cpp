@@ -10,6 +10,7 @@
 #include "cli/standard_output.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/base/parallel_for.h"
 #include "dtr/base/trace.h"
 #include "pipeline/depth_settings.h"
 
@@ -110,6 +111,7 @@ void AddCommand(CLI::App& app, const std::string& name, const std::string& descr
     Console console =
         called != nullptr ? Console(called->caller()) : Console(common->json_target == "-");
     if (!trace_file->empty()) trace::Begin();
+    const ThreadLimit limit(common->threads);
     const int code = action(Context{*common, console});
     if (!trace_file->empty()) WriteFileAtomically(*trace_file, trace::End());
     if (code != kDone) throw CLI::RuntimeError(code);

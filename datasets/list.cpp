@@ -75,8 +75,7 @@ std::vector<DatasetInfo> ListDatasets() {
   return list;
 }
 
-DatasetCheck CheckPublicSet(const std::string& name, const std::filesystem::path& folder,
-                            int threads) {
+DatasetCheck CheckPublicSet(const std::string& name, const std::filesystem::path& folder) {
   const Json& set = PublicSet(name);
   std::error_code failed;
   if (!std::filesystem::is_directory(folder, failed)) {
@@ -88,7 +87,7 @@ DatasetCheck CheckPublicSet(const std::string& name, const std::filesystem::path
   for (const auto& [path, sha256] : set.at("files").items()) files.emplace_back(path, sha256);
   enum class State { kOk, kMissing, kChanged };
   std::vector<State> states(files.size());
-  ParallelFor(0, static_cast<int>(files.size()), threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(files.size()), [&](int i) {
     const auto& [path, sha256] = files[static_cast<size_t>(i)];
     std::error_code ignored;
     State& state = states[static_cast<size_t>(i)];

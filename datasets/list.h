@@ -35,7 +35,6 @@ struct DatasetCheck {
 /// the sets as tests expect them (some are subsets or halved images, `origin` says which).
 /// Throws UsageError for unknown names and for scenes, Error when the folder is not there, saying
 /// where the set comes from.
-DatasetCheck CheckPublicSet(const std::string& name, const std::filesystem::path& folder,
-                            int threads = 0);
+DatasetCheck CheckPublicSet(const std::string& name, const std::filesystem::path& folder);
 
 }  // namespace dtr::datasets

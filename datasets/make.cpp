@@ -74,13 +74,13 @@ std::string SourceText(const DatasetSpec& spec) {
 
 /// One view's files. Everything is computed in the scene's own frame.
 void WriteView(const DatasetSpec& spec, const Scene& scene, const std::vector<Pose>& poses, int i,
-               const fs::path& folder, int threads) {
+               const fs::path& folder) {
   const Pose& pose = poses[static_cast<size_t>(i)];
   const PinholeCamera camera = MakeCamera(spec.width_px, spec.height_px, spec.focal_35mm);
   const std::string name = NumberName(i);
 
   const PhotoOptions options =
-      PhotoOptionsOf(spec, i, HashOf(spec.seed, static_cast<std::uint64_t>(i)), threads);
+      PhotoOptionsOf(spec, i, HashOf(spec.seed, static_cast<std::uint64_t>(i)));
   const Grid<float> light = RenderLight(scene, camera, pose, options);
   io::ExifFocal exif;
   exif.focal_mm = spec.focal_35mm;
@@ -90,18 +90,17 @@ void WriteView(const DatasetSpec& spec, const Scene& scene, const std::vector<Po
   io::WriteJpegWithExif(folder / "images" / (name + ".jpg"), Develop(light, options),
                         spec.jpeg_quality, exif);
 
-  WriteViewTruth(spec, scene, poses, i, light, options, folder, name, threads);
+  WriteViewTruth(spec, scene, poses, i, light, options, folder, name);
 }
 
 /// One panorama's files: itself, and the views of a cube around it, exact.
 void WritePanorama(const DatasetSpec& spec, const Scene& scene, const Pose& pose, int i,
-                   const fs::path& folder, int threads, io::CameraList& list) {
+                   const fs::path& folder, io::CameraList& list) {
   const std::string name = NumberName(i);
   PhotoOptions options;
   options.supersampling = spec.supersampling;
   options.noise_sigma = spec.noise;
   options.gain = ExposureGain(spec.exposure_drift, i, spec.views);
-  options.threads = threads;
   options.seed = HashOf(spec.seed, static_cast<std::uint64_t>(i));
   io::WritePanoramaJpeg(folder / "panoramas" / (name + ".jpg"),
                         Develop(RenderPanoramaLight(scene, spec.width_px, pose, options), options),
@@ -118,7 +117,7 @@ void WritePanorama(const DatasetSpec& spec, const Scene& scene, const Pose& pose
     io::WriteImage(folder / "images" / faces[f].name / (name + ".jpg"),
                    RenderPhoto(scene, camera, face_pose, options), spec.jpeg_quality);
     io::WriteExr(folder / "depth" / faces[f].name / (name + ".exr"),
-                 RenderDepth(scene, camera, face_pose, threads, spec.scale).grid());
+                 RenderDepth(scene, camera, face_pose, spec.scale).grid());
     io::NamedCamera named;
     named.name = faces[f].name + "/" + name + ".jpg";
     named.depth_file = faces[f].name + "/" + name + ".exr";
@@ -161,29 +160,28 @@ void CheckSpec(const DatasetSpec& spec) {
   }
 }
 
-PhotoOptions PhotoOptionsOf(const DatasetSpec& spec, int i, std::uint64_t noise_seed, int threads) {
+PhotoOptions PhotoOptionsOf(const DatasetSpec& spec, int i, std::uint64_t noise_seed) {
   PhotoOptions options;
   options.supersampling = spec.supersampling;
   options.noise_sigma = spec.noise;
   options.gain = ExposureGain(spec.exposure_drift, i, spec.views);
   options.lens = LensOf(spec);
   options.seed = noise_seed;
-  options.threads = threads;
   return options;
 }
 
 void WriteViewTruth(const DatasetSpec& spec, const Scene& scene, const std::vector<Pose>& poses,
                     int i, const Grid<float>& light, const PhotoOptions& options,
-                    const fs::path& folder, const std::string& stem, int threads) {
+                    const fs::path& folder, const std::string& stem) {
   const Pose& pose = poses[static_cast<size_t>(i)];
   const PinholeCamera camera = MakeCamera(spec.width_px, spec.height_px, spec.focal_35mm);
   io::WriteExr(folder / "depth" / (stem + ".exr"),
-               RenderDepth(scene, camera, pose, threads, spec.scale).grid());
+               RenderDepth(scene, camera, pose, spec.scale).grid());
 
   std::vector<Pose> others = poses;
   others.erase(others.begin() + i);
   io::WriteMask(folder / "masks" / (stem + "_visible.png"),
-                VisibilityMask(scene, camera, pose, others, kMinVisibleOthers, threads));
+                VisibilityMask(scene, camera, pose, others, kMinVisibleOthers));
   // Noise is no texture, and truth lies on the ideal grid: the mask is made without either.
   PhotoOptions ideal = options;
   ideal.noise_sigma = 0;
@@ -214,8 +212,7 @@ Pose WrittenPose(const Pose& cam_from_scene, double scale, const Eigen::Vector3d
           scale * cam_from_scene.translation - cam_from_scene.rotation * world_offset};
 }
 
-void MakeDataset(const DatasetSpec& given, const fs::path& given_folder, int threads,
-                 Progress& progress) {
+void MakeDataset(const DatasetSpec& given, const fs::path& given_folder, Progress& progress) {
   const fs::path out_folder = WithoutTrailingSlash(given_folder);
   DatasetSpec spec = given;
   CheckSpec(spec);
@@ -225,7 +222,7 @@ void MakeDataset(const DatasetSpec& given, const fs::path& given_folder, int thr
                      "it or choose another name");
   }
   if (spec.steps > 1) {
-    MakeDynamicDataset(spec, out_folder, threads, progress);
+    MakeDynamicDataset(spec, out_folder, progress);
     return;
   }
   const Scene scene = MakeScene(spec.scene, spec.seed, spec.time_s);
@@ -249,11 +246,11 @@ void MakeDataset(const DatasetSpec& given, const fs::path& given_folder, int thr
   for (int i = 0; i < spec.views; ++i) {
     progress.ThrowIfInterrupted();
     if (spec.panoramas) {
-      WritePanorama(spec, scene, poses[static_cast<size_t>(i)], i, partial, threads, list);
+      WritePanorama(spec, scene, poses[static_cast<size_t>(i)], i, partial, list);
       progress.Update(i + 1);
       continue;
     }
-    WriteView(spec, scene, poses, i, partial, threads);
+    WriteView(spec, scene, poses, i, partial);
     io::NamedCamera camera;
     camera.name = NumberName(i) + ".jpg";
     camera.depth_file = NumberName(i) + ".exr";

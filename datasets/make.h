@@ -65,7 +65,7 @@ Pose WrittenPose(const Pose& cam_from_scene, double scale, const Eigen::Vector3d
 /// The folder appears when all is done, under its name with ".partial" before.
 /// Throws UsageError when it exists or the spec is out of range (naming the field), Error when
 /// something cannot be written.
-void MakeDataset(const DatasetSpec& spec, const std::filesystem::path& out_folder, int threads,
+void MakeDataset(const DatasetSpec& spec, const std::filesystem::path& out_folder,
                  Progress& progress);
 
 /// dataset.json and back: MakeDataset with what was read gives the same bytes again.

@@ -124,7 +124,7 @@ std::string StepsSourceText(const DatasetSpec& spec) {
 
 /// The photos of all cameras at one time step, and its truth.
 std::vector<ImageRgb8> WriteStep(const DatasetSpec& spec, int step, const std::vector<Pose>& poses,
-                                 const io::CameraList& list, const fs::path& folder, int threads) {
+                                 const io::CameraList& list, const fs::path& folder) {
   const double time_s = spec.time_s + static_cast<double>(step) / spec.steps_per_second;
   const Scene scene = MakeScene(spec.scene, spec.seed, time_s);
   const PinholeCamera camera = MakeCamera(spec.width_px, spec.height_px, spec.focal_35mm);
@@ -135,11 +135,11 @@ std::vector<ImageRgb8> WriteStep(const DatasetSpec& spec, int step, const std::v
   std::vector<ImageRgb8> photos;
   for (int i = 0; i < spec.views; ++i) {
     const PhotoOptions options = PhotoOptionsOf(
-        spec, i, HashOf(spec.seed, static_cast<std::uint64_t>(i), static_cast<std::uint64_t>(step)),
-        threads);
+        spec, i,
+        HashOf(spec.seed, static_cast<std::uint64_t>(i), static_cast<std::uint64_t>(step)));
     const Grid<float> light = RenderLight(scene, camera, poses[static_cast<size_t>(i)], options);
     photos.push_back(Develop(light, options));
-    WriteViewTruth(spec, scene, poses, i, light, options, truth, CameraName(i), threads);
+    WriteViewTruth(spec, scene, poses, i, light, options, truth, CameraName(i));
   }
   return photos;
 }
@@ -185,7 +185,7 @@ class Recording {
 
 }  // namespace
 
-void MakeDynamicDataset(const DatasetSpec& given, const fs::path& given_folder, int threads,
+void MakeDynamicDataset(const DatasetSpec& given, const fs::path& given_folder,
                         Progress& progress) {
   const fs::path out_folder = WithoutTrailingSlash(given_folder);
   DatasetSpec spec = given;
@@ -211,7 +211,7 @@ void MakeDynamicDataset(const DatasetSpec& given, const fs::path& given_folder, 
   progress.Stage("rendering time steps and truth", spec.steps);
   for (int step = 0; step < spec.steps; ++step) {
     progress.ThrowIfInterrupted();
-    recording.Add(step, WriteStep(spec, step, poses, list, work.path(), threads));
+    recording.Add(step, WriteStep(spec, step, poses, list, work.path()));
     progress.Update(step + 1);
   }
   recording.Finish(progress);

@@ -18,6 +18,6 @@ namespace dtr::datasets {
 ///   dataset.json, SOURCE.md
 /// Every photo has noise of its own. Throws as MakeDataset.
 void MakeDynamicDataset(const DatasetSpec& spec, const std::filesystem::path& out_folder,
-                        int threads, Progress& progress);
+                        Progress& progress);
 
 }  // namespace dtr::datasets

@@ -166,7 +166,7 @@ Grid<float> RenderLight(const Scene& scene, const PinholeCamera& camera, const P
   const double monotone = MonotoneRadius(options.lens);
   const int n = options.supersampling;
   Grid<float> light(camera.width_px(), camera.height_px(), 3);
-  ParallelFor(0, camera.height_px(), options.threads, [&](int y) {
+  ParallelFor(0, camera.height_px(), [&](int y) {
     int last = -1;
     for (int x = 0; x < camera.width_px(); ++x) {
       Vector3d sum = Vector3d::Zero();
@@ -201,7 +201,7 @@ Grid<float> RenderPanoramaLight(const Scene& scene, int width_px, const Pose& ca
   const RayCaster caster(scale, cam_from_world);
   const int n = options.supersampling;
   Grid<float> light(width_px, width_px / 2, 3);
-  ParallelFor(0, light.height(), options.threads, [&](int y) {
+  ParallelFor(0, light.height(), [&](int y) {
     int last = -1;
     for (int x = 0; x < width_px; ++x) {
       Vector3d sum = Vector3d::Zero();
@@ -221,7 +221,7 @@ Grid<float> RenderPanoramaLight(const Scene& scene, int width_px, const Pose& ca
 
 ImageRgb8 Develop(const Grid<float>& light, const PhotoOptions& options) {
   ImageRgb8 photo(light.width(), light.height(), 3);
-  ParallelFor(0, light.height(), options.threads, [&](int y) {
+  ParallelFor(0, light.height(), [&](int y) {
     for (int x = 0; x < light.width(); ++x) {
       for (int c = 0; c < 3; ++c) {
         double level = SrgbFromLinear(options.gain * light(x, y, c));
@@ -241,10 +241,10 @@ ImageRgb8 RenderPhoto(const Scene& scene, const PinholeCamera& camera, const Pos
 }
 
 DepthImage RenderDepth(const Scene& scene, const PinholeCamera& camera, const Pose& cam_from_world,
-                       int threads, double scale) {
+                       double scale) {
   const RayCaster caster(camera, cam_from_world);
   DepthImage depth(camera.width_px(), camera.height_px());
-  ParallelFor(0, camera.height_px(), threads, [&](int y) {
+  ParallelFor(0, camera.height_px(), [&](int y) {
     for (int x = 0; x < camera.width_px(); ++x) {
       const std::optional<Hit> hit = scene.Intersect(caster.ThroughPixel({x + 0.5, y + 0.5}));
       if (hit) depth(x, y) = static_cast<float>(hit->t * scale);
@@ -254,7 +254,7 @@ DepthImage RenderDepth(const Scene& scene, const PinholeCamera& camera, const Po
 }
 
 Mask VisibilityMask(const Scene& scene, const PinholeCamera& camera, const Pose& cam_from_world,
-                    const std::vector<Pose>& others, int min_others, int threads) {
+                    const std::vector<Pose>& others, int min_others) {
   const RayCaster caster(camera, cam_from_world);
   // Near cameras first: they most likely see the same, and min_others ends the search.
   std::vector<Pose> by_distance = others;
@@ -263,7 +263,7 @@ Mask VisibilityMask(const Scene& scene, const PinholeCamera& camera, const Pose&
            (b.TargetOriginInSource() - caster.eye()).squaredNorm();
   });
   Mask mask(camera.width_px(), camera.height_px());
-  ParallelFor(0, camera.height_px(), threads, [&](int y) {
+  ParallelFor(0, camera.height_px(), [&](int y) {
     for (int x = 0; x < camera.width_px(); ++x) {
       const std::optional<Hit> hit = scene.Intersect(caster.ThroughPixel({x + 0.5, y + 0.5}));
       if (!hit) continue;
@@ -331,7 +331,7 @@ DtrSet RenderTruthSet(const Scene& scene, const PinholeCamera& camera,
     view.camera = camera;
     view.cam_from_world = cams_from_world[i];
     view.image = RenderPhoto(scene, camera, cams_from_world[i], of_view);
-    view.depth = RenderDepth(scene, camera, cams_from_world[i], options.threads);
+    view.depth = RenderDepth(scene, camera, cams_from_world[i]);
     double near = kNoHit, far = 0;
     for (const float z : view.depth.grid().data()) {
       if (DepthImage::IsHole(z)) continue;

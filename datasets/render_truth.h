@@ -28,7 +28,6 @@ struct PhotoOptions {
   double gain = 1;         ///< exposure: factor on linear light
   RadialLens lens;
   std::uint64_t seed = 0;  ///< of the noise; give every view its own
-  int threads = 0;         ///< 0: all cores; the image does not depend on it
 };
 
 /// Throws UsageError for options out of range, or a lens that folds over inside the image, or a
@@ -60,13 +59,13 @@ ImageRgb8 RenderPhoto(const Scene& scene, const PinholeCamera& camera, const Pos
 /// Plane z at pixel centres (one ray each, no antialiasing), multiplied by `scale` before it is
 /// rounded to float. Rays that hit nothing are holes.
 DepthImage RenderDepth(const Scene& scene, const PinholeCamera& camera, const Pose& cam_from_world,
-                       int threads = 0, double scale = 1);
+                       double scale = 1);
 
 /// 255 where the surface point seen at the pixel's centre is seen by at least `min_others` of
 /// `others`: inside the image, on the same side of the surface, nothing in between. By ray casting,
 /// no depth tolerance involved.
 Mask VisibilityMask(const Scene& scene, const PinholeCamera& camera, const Pose& cam_from_world,
-                    const std::vector<Pose>& others, int min_others = 2, int threads = 0);
+                    const std::vector<Pose>& others, int min_others = 2);
 
 /// 255 where the photo has texture: the standard deviation of its luma (BT.601) over the 9x9 pixels
 /// around (fewer at the border) is at least 4 levels.

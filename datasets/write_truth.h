@@ -11,13 +11,13 @@
 namespace dtr::datasets {
 
 /// How view `i` is photographed; its noise has the seed `noise_seed`.
-PhotoOptions PhotoOptionsOf(const DatasetSpec& spec, int i, std::uint64_t noise_seed, int threads);
+PhotoOptions PhotoOptionsOf(const DatasetSpec& spec, int i, std::uint64_t noise_seed);
 
 /// depth/STEM.exr, masks/STEM_visible.png and masks/STEM_texture.png below `folder` of
 /// `poses[i]`; `light` is that of its photo by `options`.
 void WriteViewTruth(const DatasetSpec& spec, const Scene& scene, const std::vector<Pose>& poses,
                     int i, const Grid<float>& light, const PhotoOptions& options,
-                    const std::filesystem::path& folder, const std::string& stem, int threads);
+                    const std::filesystem::path& folder, const std::string& stem);
 
 /// Throws UsageError naming the field that is out of range.
 void CheckSpec(const DatasetSpec& spec);

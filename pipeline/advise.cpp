@@ -10,12 +10,12 @@
 namespace dtr::pipeline {
 
 std::vector<advise::CoarseView> CoarseViewsOf(const std::filesystem::path& folder,
-                                              const DtrSet& set, const Room& room,
+                                              const DtrSet& set, double memory_gb,
                                               Progress& progress) {
   const auto& views = set.frames.front().views;
   const std::vector<int> which = ViewsWithDepth(views);
   std::vector<advise::CoarseView> coarse(which.size());
-  ForViews(views, which, "reading depth", room, progress, [&](size_t k) {
+  ForViews(views, which, "reading depth", memory_gb, progress, [&](size_t k) {
     const View loaded = Loaded(views[static_cast<size_t>(which[k])], folder, {.images = false});
     coarse[k] = advise::MakeCoarse(loaded, advise::kCoarseSidePx);
   });

@@ -6,14 +6,13 @@
 
 #include "dtr/advise/advise.h"
 #include "dtr/types/dtr_set.h"
-#include "pipeline/room.h"
 
 namespace dtr::pipeline {
 
 /// The source views of a set that have depth, coarse. `set` is of `folder`, without copies of
 /// views.
 std::vector<advise::CoarseView> CoarseViewsOf(const std::filesystem::path& folder,
-                                              const DtrSet& set, const Room& room,
+                                              const DtrSet& set, double memory_gb,
                                               Progress& progress);
 
 /// "3 of 40 positions ... are poor", and what is to be done about it: two lines for who reads on in

@@ -43,7 +43,6 @@ Batch Planned(const BatchOptions& options) {
   }
   batch.stages.push_back({kLastStage, 1, true});
   batch.local = options.local;
-  batch.threads = options.threads;
   batch.slurm = options.slurm;
   batch.replaced = WhenWritten(batch.set);
   batch.memory_gb = options.build.depth.memory_gb.value_or(kDefaultMemoryGb);
@@ -231,7 +230,6 @@ BatchOptions ReadBatch(const fs::path& set) {
   options.words = batch.words;
   options.directory = batch.directory;
   options.local = batch.local;
-  options.threads = batch.threads;
   options.slurm = batch.slurm;
   options.resumes = true;
   return options;

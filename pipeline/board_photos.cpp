@@ -75,19 +75,17 @@ Looked LookAt(const fs::path& file, const calib::Board& board,
 
 BoardPhotos ReadBoardPhotos(const fs::path& folder, const std::string& pattern,
                             const calib::Board& board, const calib::DetectOptions& options,
-                            int threads, Progress& progress,
-                            const std::optional<calib::LensCamera>& known) {
+                            Progress& progress, const std::optional<calib::LensCamera>& known) {
   const std::vector<std::string> names = MatchingNames(folder, pattern);
   BoardPhotos photos;
   photos.contents = ContentsOfBoardFolder(folder, names.size());
   progress.Note(capture::LineOf(photos.contents));
-  RequireGivenBoard(
-      folder.string(), board, names.size(),
-      [&](size_t i) { return io::ReadImage(folder / names[i]); }, threads);
+  RequireGivenBoard(folder.string(), board, names.size(),
+                    [&](size_t i) { return io::ReadImage(folder / names[i]); });
   std::vector<Looked> all(names.size());
   progress.Stage("looking for the board", static_cast<int>(names.size()));
   std::atomic<int> done = 0;
-  ParallelFor(0, static_cast<int>(names.size()), threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(names.size()), [&](int i) {
     progress.ThrowIfInterrupted();
     const auto at = static_cast<size_t>(i);
     all[at] = LookAt(folder / names[at], board, options);

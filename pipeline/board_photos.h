@@ -29,7 +29,6 @@ struct BoardPhotos {
 /// another board (board_given.h), Error when no photo shows the board.
 BoardPhotos ReadBoardPhotos(const std::filesystem::path& folder, const std::string& pattern,
                             const calib::Board& board, const calib::DetectOptions& options,
-                            int threads, Progress& progress,
-                            const std::optional<calib::LensCamera>& known = {});
+                            Progress& progress, const std::optional<calib::LensCamera>& known = {});
 
 }  // namespace dtr::pipeline

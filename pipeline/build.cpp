@@ -10,7 +10,6 @@
 #include "calib/sparse_from_sfm.h"
 #include "dtr/base/error.h"
 #include "dtr/base/machine.h"
-#include "dtr/base/parallel_for.h"
 #include "dtr/eval/json.h"
 #include "dtr/io/hand_over.h"
 #include "dtr/io/run_record_json.h"
@@ -93,10 +92,10 @@ void RequireTwoSources(const capture::Capture& capture, const std::vector<bool>&
 
 // The reprojection tests of every calibrated photo, held-out ones included.
 SetValidation Validate(const std::filesystem::path& folder, DtrSet& set, const SparseScene& sparse,
-                       double memory_gb, BuildReport& report, int threads, Progress& progress) {
+                       double memory_gb, BuildReport& report, Progress& progress) {
   SetLimits limits;
   limits.memory_gb = std::min(limits.memory_gb, memory_gb);
-  SetValidation validation = ValidateSet(folder, set, sparse, limits, threads, progress);
+  SetValidation validation = ValidateSet(folder, set, sparse, limits, progress);
   report.validated = true;
   report.validation_passed = validation.passed();
   set.validation_json = eval::ValidationJson(validation.tests);
@@ -109,12 +108,11 @@ SetValidation Validate(const std::filesystem::path& folder, DtrSet& set, const S
 // Where the capture is thin, from the depth that was found. Kept out of set.json: it says nothing
 // that `dtr advise` would not find in the set.
 void AdviseOn(const std::filesystem::path& folder, DtrSet set, BuildReport& report,
-              const Room& room, Progress& progress) {
+              double memory_gb, Progress& progress) {
   io::CollapseDuplicates(set);
-  const auto views = CoarseViewsOf(folder, set, room, progress);
+  const auto views = CoarseViewsOf(folder, set, memory_gb, progress);
   if (views.size() < 2) return;
   advise::AdviseOptions options;
-  options.threads = room.threads;
   report.coverage = AdviceLines(advise::Advise(views, options, progress));
 }
 
@@ -148,7 +146,6 @@ CalibrateOptions CalibrateOptionsFor(const BuildOptions& options, const BuildInp
   calibrate.poses_format = options.poses_format;
   calibrate.held_out = inputs.held_out;
   calibrate.strict = options.holdout_strict;
-  calibrate.threads = options.threads;
   calibrate.seed = options.seed;
   calibrate.memory_gb = memory_gb;
   calibrate.refine = options.refine;
@@ -174,16 +171,16 @@ void ReportCalibration(const CalibratedPhotos& calibrated, const BuildInputs& in
 }
 
 // What depth that was found becomes in the set.
-void FinishDepth(const BuildOptions& options, const SparseScene& sparse, const Room& room,
+void FinishDepth(const BuildOptions& options, const SparseScene& sparse, double memory_gb,
                  io::SetWriter& writer, DtrSet& set, Progress& progress) {
-  FinishScene(set, SourcePoints(sparse, set.frames.front().views), writer, room, progress);
+  FinishScene(set, SourcePoints(sparse, set.frames.front().views), writer, memory_gb, progress);
   if (options.depth.depth_error_px) {
-    RecodeDepth(set, *options.depth.depth_error_px, writer, room, progress);
+    RecodeDepth(set, *options.depth.depth_error_px, writer, memory_gb, progress);
   }
   if (options.depth.completion) {
-    CompleteDepth(set, sparse, writer, room, progress);
+    CompleteDepth(set, sparse, writer, memory_gb, progress);
   }
-  WriteMeshes(set, writer, room, progress);
+  WriteMeshes(set, writer, memory_gb, progress);
 }
 
 // A process with a part of depth needs the images of all views.
@@ -245,8 +242,7 @@ BuildReport BuildOrPart(const BuildOptions& options, Progress& listener) {
   std::vector<View>& views = set.frames.front().views;
   RequireTwoSources(photos, held_out, calibrated);
   views = UndistortPhotos(photos, calibrated, held_out,
-                          {options.max_size_px, {options.threads, memory_gb}, share.Undistortion()},
-                          writer, progress);
+                          {options.max_size_px, memory_gb, share.Undistortion()}, writer, progress);
   share.EndAfter("undistortion");
   if (share.is_shared()) RequireImages(views, writer);
   const SparseScene sparse = SparseOf(calibrated, views);
@@ -254,7 +250,6 @@ BuildReport BuildOrPart(const BuildOptions& options, Progress& listener) {
   log.Begin("depth");
   AddParts(writer.work_folder(), {"ranges", "search", "pass", "maps"}, log);
   DepthStageOptions depth_options;
-  depth_options.threads = options.threads;
   depth_options.seed = options.seed;
   depth_options.photos = PhotoCamerasOf(calibrated, views);
   depth_options.part = share.Depth();
@@ -269,13 +264,12 @@ BuildReport BuildOrPart(const BuildOptions& options, Progress& listener) {
   report.prior = stage.prior;
 
   log.Begin("finishing");
-  const Room room{options.threads, memory_gb};
-  FinishDepth(options, sparse, room, writer, set, progress);
+  FinishDepth(options, sparse, memory_gb, writer, set, progress);
   set.provenance_json = ProvenanceJson(options, OptionsJson(options, stage.quality),
                                        PhotosJson(photos, is_source), calibrated, report)
                             .dump();
   const SetValidation validation =
-      Validate(writer.folder(), set, sparse, memory_gb, report, options.threads, progress);
+      Validate(writer.folder(), set, sparse, memory_gb, report, progress);
   writer.WriteSparse(set, sparse);
   WriteSetPage(writer, set,
                {.name = options.output.stem().string(),
@@ -284,13 +278,13 @@ BuildReport BuildOrPart(const BuildOptions& options, Progress& listener) {
                 .skipped = report.skipped,
                 .not_registered = report.not_registered.size(),
                 .prior = report.prior,
-                .room = room},
+                .memory_gb = memory_gb},
                progress);
-  AdviseOn(writer.folder(), set, report, room, progress);
+  AdviseOn(writer.folder(), set, report, memory_gb, progress);
   log.End();
   std::vector<std::string> lines = progress.lines();
   lines.insert(lines.end(), report.coverage.begin(), report.coverage.end());
-  io::WriteRunRecord(writer.folder(), log.Record(ResolveThreads(options.threads), std::move(lines)),
+  io::WriteRunRecord(writer.folder(), log.Record(std::move(lines)),
                      {{"screening", ScreeningJson(report)}});
   writer.Finish(set);
   report.set = std::move(set);

@@ -42,7 +42,6 @@ struct BuildOptions {
   std::string force_stage;  ///< of an interrupted run: done again with all after it; "": none
   /// Does this alone, of a build that others of the same options began or will end (build_part.h).
   std::optional<BuildPart> part = {};
-  int threads = 0;
   std::uint64_t seed = 0;
 };
 

@@ -13,7 +13,6 @@
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/machine.h"
-#include "dtr/base/parallel_for.h"
 #include "dtr/base/quiet_progress.h"
 #include "dtr/eval/json.h"
 #include "dtr/io/run_record_json.h"
@@ -143,8 +142,8 @@ void WriteImages(const Recording& recording, const FixedCameras& cameras,
                 view.name, recording.steps()[step].name, lens.width_px, lens.height_px,
                 image.width(), image.height()));
           }
-          calib::UndistortedPhoto flat = calib::Undistort(image, {}, lens, lens.Pinhole(),
-                                                          options.max_size_px, options.threads);
+          calib::UndistortedPhoto flat =
+              calib::Undistort(image, {}, lens, lens.Pinhole(), options.max_size_px);
           view.image = std::move(flat.image);
           view.mask = std::move(flat.mask);
           writer.WriteView(view, unit);
@@ -161,33 +160,32 @@ void FinishViews(const SparseScene& points, const BuildOptions& options, double 
                  std::optional<BackgroundViews> backgrounds, io::SetWriter& writer, DtrSet& set,
                  Progress& progress) {
   QuietProgress quiet(progress);
-  const Room room{options.threads, memory_gb};
   std::optional<StillCompletion> still_completed;
   if (options.depth.completion && backgrounds) {
-    still_completed.emplace(std::move(*backgrounds), points, set.frames.front().views, writer, room,
-                            quiet);
+    still_completed.emplace(std::move(*backgrounds), points, set.frames.front().views, writer,
+                            memory_gb, quiet);
   }
   progress.Stage("finishing time steps", static_cast<int>(set.frames.size()));
   for (size_t step = 0; step < set.frames.size(); ++step) {
     DtrSet still = TakeStep(set, step);
     if (options.depth.depth_error_px) {
-      RecodeDepth(still, *options.depth.depth_error_px, writer, room, quiet);
+      RecodeDepth(still, *options.depth.depth_error_px, writer, memory_gb, quiet);
     }
     if (options.depth.completion) {
       CompleteDepth(
-          still, points, writer, room, quiet,
+          still, points, writer, memory_gb, quiet,
           still_completed ? still_completed->Of(still.frames.front().views) : KnownCompletion());
     }
     PutBack(std::move(still), step, set);
     progress.Update(static_cast<int>(step) + 1);
     progress.ThrowIfInterrupted();
   }
-  io::StoreStillOnce(writer.folder(), set, options.threads, memory_gb, progress);
+  io::StoreStillOnce(writer.folder(), set, memory_gb, progress);
   // After it, as a mesh names the files that it is of.
   progress.Stage("meshes", static_cast<int>(set.frames.size()));
   for (size_t step = 0; step < set.frames.size(); ++step) {
     DtrSet still = TakeStep(set, step);
-    WriteMeshes(still, writer, room, quiet);
+    WriteMeshes(still, writer, memory_gb, quiet);
     PutBack(std::move(still), step, set);
     progress.Update(static_cast<int>(step) + 1);
     progress.ThrowIfInterrupted();
@@ -230,7 +228,6 @@ BuildReport BuildDynamicSet(const BuildOptions& asked, const DynamicOptions& dyn
 
   log.Begin("calibration");
   fixed.calibrate.held_out = held_out;
-  fixed.calibrate.threads = options.threads;
   fixed.calibrate.seed = options.seed;
   fixed.calibrate.memory_gb = memory_gb;
   fixed.calibrate.refine = options.refine;
@@ -249,14 +246,13 @@ BuildReport BuildDynamicSet(const BuildOptions& asked, const DynamicOptions& dyn
 
   log.Begin("depth");
   std::optional<BackgroundViews> backgrounds = ComputeStepDepths(
-      set, cameras.all_points, {options.depth, quality, temporal, options.threads, options.seed},
-      writer, progress);
+      set, cameras.all_points, {options.depth, quality, temporal, options.seed}, writer, progress);
 
   log.Begin("finishing");
   FinishViews(cameras.sparse, options, memory_gb, std::move(backgrounds), writer, set, progress);
   if (dynamic.video) {
-    io::StoreCameraVideos(writer.folder(), writer.work_folder(), set, *dynamic.video,
-                          options.threads, memory_gb, progress);
+    io::StoreCameraVideos(writer.folder(), writer.work_folder(), set, *dynamic.video, memory_gb,
+                          progress);
   }
   Json provenance =
       ProvenanceJson(options, OptionsJson(options, quality), files, cameras.calibrated, report);
@@ -271,7 +267,7 @@ BuildReport BuildDynamicSet(const BuildOptions& asked, const DynamicOptions& dyn
   SetLimits limits;
   limits.memory_gb = std::min(limits.memory_gb, memory_gb);
   const SetValidation validation =
-      ValidateSet(writer.folder(), first, cameras.sparse, limits, options.threads, progress);
+      ValidateSet(writer.folder(), first, cameras.sparse, limits, progress);
   report.validated = true;
   report.validation_passed = validation.passed();
   set.validation_json = eval::ValidationJson(validation.tests);
@@ -283,11 +279,10 @@ BuildReport BuildDynamicSet(const BuildOptions& asked, const DynamicOptions& dyn
                 .skipped = {},
                 .not_registered = 0,
                 .prior = {},
-                .room = {options.threads, memory_gb}},
+                .memory_gb = memory_gb},
                progress);
   log.End();
-  io::WriteRunRecord(writer.folder(), log.Record(ResolveThreads(options.threads), progress.lines()),
-                     {});
+  io::WriteRunRecord(writer.folder(), log.Record(progress.lines()), {});
   writer.Finish(set);
   report.set = std::move(set);
   report.written = options.output;

@@ -154,7 +154,7 @@ bool IsShared(const std::optional<colmap::SfmPart>& part) {
 void PreparePhotos(const capture::Capture& photos, const CalibrateOptions& options,
                    const fs::path& folder, Progress& progress) {
   if (IsShared(options.part)) return;  // other processes read them
-  capture::PrepareSfmImages(photos, folder, 0, options.threads, options.memory_gb, progress);
+  capture::PrepareSfmImages(photos, folder, 0, options.memory_gb, progress);
 }
 
 std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
@@ -174,7 +174,6 @@ std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
 colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options) {
   colmap::SfmOptions sfm;
   sfm.engine = options.sfm.engine;
-  sfm.threads = options.threads;
   sfm.seed = options.seed;
   sfm.memory_gb = options.memory_gb;
   sfm.max_image_size_px = options.sfm.feature_size_px;
@@ -193,7 +192,7 @@ int FeatureImageSizePx(const std::vector<std::pair<int, int>>& sizes_px, double 
   for (const auto& [width_px, height_px] : sizes_px) {
     images.push_back({"", width_px, height_px, {}, "", {}});
   }
-  return colmap::PlanExtraction(images, 1, memory_gb, asked_px).max_image_size_px;
+  return colmap::PlanExtraction(images, memory_gb, asked_px).max_image_size_px;
 }
 
 bool NeedsFeatures(const fs::path& poses, const std::string& poses_format) {

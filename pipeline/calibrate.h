@@ -25,7 +25,6 @@ struct CalibrateOptions {
   std::string poses_format = {};  ///< its name; empty: by the content
   std::vector<bool> held_out;     ///< per photo; empty: none
   bool strict = false;  ///< held-out photos take no part in SfM and are registered afterwards
-  int threads = 0;
   std::uint64_t seed = 0;
   double memory_gb = 4;
   bool refine =

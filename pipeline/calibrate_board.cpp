@@ -52,7 +52,6 @@ calib::Calibration CalibrateBoard(const calib::Board& board, const BoardPhotos& 
   } else {
     calib::ChoiceOptions choose;
     choose.solve = options.solve;
-    choose.threads = options.threads;
     choose.seed = options.seed;
     choose.progress = &progress;
     const calib::ModelChoice choice =

@@ -14,7 +14,6 @@ namespace dtr::pipeline {
 struct BoardCalibrationOptions {
   std::optional<calib::BoardModel> model;  ///< empty: chosen by held-out views
   calib::SolveOptions solve;
-  int threads = 0;
   std::uint64_t seed = 0;
 };
 

@@ -56,7 +56,6 @@ Inputs InputsOf(const calib::Board& board, const RigPhotos& photos,
     } else {
       calib::ChoiceOptions choose;
       choose.solve = options.solve;
-      choose.threads = options.threads;
       choose.seed = options.seed;
       choose.progress = &progress;
       choose.stage = "choosing the camera model of " + camera.name;

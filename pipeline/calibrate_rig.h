@@ -21,7 +21,6 @@ struct RigCalibrationOptions {
   bool fixed_lenses = false;
   bool free_running = false;  ///< cameras take their images when they like: delays are found too
   std::map<std::string, calib::RigCameraInput> given;  ///< lenses by camera; then they are fixed
-  int threads = 0;
   std::uint64_t seed = 0;
 };
 

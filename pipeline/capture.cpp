@@ -28,8 +28,7 @@ capture::Capture Ingest(const fs::path& source, const capture::VideoOptions& vid
   const std::vector<fs::path> videos = VideosFor(source, video);
   capture::Capture photos;
   if (videos.empty()) {
-    photos = capture::IngestPhotos(source, {.threads = video.threads, .memory_gb = video.memory_gb},
-                                   progress);
+    photos = capture::IngestPhotos(source, {.memory_gb = video.memory_gb}, progress);
   } else {
     const fs::path frames = frames_folder();
     RemoveTree(frames);
@@ -39,7 +38,7 @@ capture::Capture Ingest(const fs::path& source, const capture::VideoOptions& vid
   if (!capture::ArePanoramas(photos, panoramas, &progress)) return photos;
   const fs::path views = frames_folder() / "views";
   RemoveTree(views);
-  return capture::SplitPanoramas(photos, views, video.threads, progress);
+  return capture::SplitPanoramas(photos, views, progress);
 }
 
 }  // namespace dtr::pipeline

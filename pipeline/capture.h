@@ -33,7 +33,7 @@ struct CaptureLook {
   ImageRgb8 contact_sheet;
   std::string page;
 };
-CaptureLook LookAt(const capture::Capture& capture, const std::string& title, int threads,
-                   double memory_gb, Progress& progress);
+CaptureLook LookAt(const capture::Capture& capture, const std::string& title, double memory_gb,
+                   Progress& progress);
 
 }  // namespace dtr::pipeline

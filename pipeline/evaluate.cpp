@@ -35,7 +35,6 @@ DtrSet Load(const EvaluateRequest& request, Progress& progress) {
   load.held_out = true;
   load.completed = !request.measured_only;
   load.sigma = !request.truth.empty();
-  load.threads = request.threads;
   load.warn = [&progress](const std::string& line) { progress.Note(line); };
   DtrSet set = io::LoadSet(request.set, load);
   RequireOneFrame(set);
@@ -60,12 +59,11 @@ EvaluateResult Evaluate(const EvaluateRequest& request,
   const DtrSet set = Load(request, progress);
   EvaluateResult result;
   if (!request.truth.empty()) {
-    result.depth = EvaluateDepth(set, request.truth, request.threads, progress);
+    result.depth = EvaluateDepth(set, request.truth, progress);
   }
   eval::EvaluateOptions evaluate;
   evaluate.leave_one_out = request.leave_one_out;
   evaluate.render = request.render;
-  evaluate.render.threads = request.threads;
   evaluate.not_registered = NotRegistered(set);
   ComparisonImages images(request, set);
   evaluate.on_rendered = images.Writer();

@@ -20,7 +20,6 @@ struct EvaluateRequest {
   bool force = false;            ///< files in that folder may be replaced
   RenderOptions render;
   bool measured_only = false;  ///< images are drawn without completed depth
-  int threads = 0;
 };
 
 struct EvaluateResult {

@@ -95,8 +95,7 @@ ViewTruth StoredTruth(const fs::path& folder, const io::NamedCamera& named, cons
 
 }  // namespace
 
-void ScoreDepth(const DtrSet& set, const fs::path& truth, int threads, Progress& progress,
-                DepthScorers* scorers,
+void ScoreDepth(const DtrSet& set, const fs::path& truth, Progress& progress, DepthScorers* scorers,
                 const std::function<void(const View&, const ScoredDepth&)>& on_view) {
   const io::CameraList list = io::ReadCamerasJson(truth / "cameras.json");
   const std::vector<Pair> pairs = PairByName(set, list, truth);
@@ -114,7 +113,7 @@ void ScoreDepth(const DtrSet& set, const fs::path& truth, int threads, Progress&
     const DepthImage depth = view.depth.empty() ? none : MeasuredDepth(view);
     const ViewTruth found =
         cast && !eval::IsSameGrid(pair.truth->camera, view.camera)
-            ? cast->On(view, static_cast<size_t>(pair.truth - list.cameras.data()), threads)
+            ? cast->On(view, static_cast<size_t>(pair.truth - list.cameras.data()))
             : StoredTruth(truth, *pair.truth, view);
     const DepthImage truth_there = eval::SubsampleTruth(found.depth, view.depth_scale);
     const Mask scored = eval::SubsampleMask(found.scored, view.depth_scale);
@@ -138,10 +137,9 @@ eval::DepthScores ScoresOf(const DepthScorers& scorers) {
   return scores;
 }
 
-eval::DepthScores EvaluateDepth(const DtrSet& set, const fs::path& truth, int threads,
-                                Progress& progress) {
+eval::DepthScores EvaluateDepth(const DtrSet& set, const fs::path& truth, Progress& progress) {
   DepthScorers scorers;
-  ScoreDepth(set, truth, threads, progress, &scorers, {});
+  ScoreDepth(set, truth, progress, &scorers, {});
   return ScoresOf(scorers);
 }
 

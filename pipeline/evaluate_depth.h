@@ -16,7 +16,7 @@ namespace dtr::pipeline {
 /// The gauge: cameras that agree with the true ones are taken as they are; else one similarity is
 /// fitted to the camera centres and its residual is reported.
 /// Throws Error when a grid differs, the cameras cannot be aligned or a file is missing or broken.
-eval::DepthScores EvaluateDepth(const DtrSet& set, const std::filesystem::path& truth, int threads,
+eval::DepthScores EvaluateDepth(const DtrSet& set, const std::filesystem::path& truth,
                                 Progress& progress);
 
 /// The scorers of EvaluateDepth, that more than one set may be added to.
@@ -32,8 +32,8 @@ struct ScoredDepth {
 };
 
 /// As EvaluateDepth, adding to `scorers`; hands out every view that is scored (null: to nobody).
-void ScoreDepth(const DtrSet& set, const std::filesystem::path& truth, int threads,
-                Progress& progress, DepthScorers* scorers,
+void ScoreDepth(const DtrSet& set, const std::filesystem::path& truth, Progress& progress,
+                DepthScorers* scorers,
                 const std::function<void(const View&, const ScoredDepth&)>& on_view);
 eval::DepthScores ScoresOf(const DepthScorers& scorers);
 

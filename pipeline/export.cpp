@@ -60,16 +60,15 @@ ExportReport ExportColmap(const ExportRequest& request, Progress& progress) {
   const fs::path output = WithoutTrailingSlash(request.output);
   DtrSet set = SetToExport(request, "COLMAP", progress);
   WorkFolder work(WorkFolder::Of(output), "export");
-  const StartPoints start = StartPointsOf(request.set, set, request.threads, progress);
+  const StartPoints start = StartPointsOf(request.set, set, progress);
   ExportReport report;
   report.points_from_depth = start.from_depth;
   std::vector<View>& views = set.frames.front().views;
   const std::vector<std::string> names = ImageNames(views);
   for (size_t i = 0; i < views.size(); ++i) views[i].name = names[i];
   if (request.text) NameWithoutBlanks(views, progress);
-  const calib::SfmModel model = colmap::ModelFromViews(set, start.scene, [&](const View& view) {
-    return ImageOf(request.set, view, request.threads);
-  });
+  const calib::SfmModel model = colmap::ModelFromViews(
+      set, start.scene, [&](const View& view) { return ImageOf(request.set, view); });
   ExportImages(request.set, set, work.path() / "images");
   colmap::WriteModel(work.path() / "sparse" / "0", model,
                      request.text ? colmap::Format::kText : colmap::Format::kBinary);

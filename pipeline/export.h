@@ -27,13 +27,12 @@ struct ExportRequest {
   std::filesystem::path output;  ///< folder or file to write
   bool force = false;            ///< replaces a file, never a folder
   bool text = false;             ///< COLMAP's text files instead of binary
-  int threads = 0;
-  double memory_gb = 4;    ///< for depth maps that are held at a time
-  bool completed = false;  ///< with completed depth, not only what was measured
-  int min_views = 2;       ///< clouds, meshes: views that show a point at the same depth
-  double voxel = 0;        ///< meshes: its width, scene units; 0: twice the median pixel's
-  size_t max_count = 0;    ///< splats: Gaussians at most; 0: no bound
-  bool full_sh = false;    ///< splats: with the coefficients (all 0) of degrees 1 to 3
+  double memory_gb = 4;          ///< for depth maps that are held at a time
+  bool completed = false;        ///< with completed depth, not only what was measured
+  int min_views = 2;             ///< clouds, meshes: views that show a point at the same depth
+  double voxel = 0;              ///< meshes: its width, scene units; 0: twice the median pixel's
+  size_t max_count = 0;          ///< splats: Gaussians at most; 0: no bound
+  bool full_sh = false;          ///< splats: with the coefficients (all 0) of degrees 1 to 3
   DepthFileFormat depth_format = DepthFileFormat::kExr;
   DepthKind depth_kind = DepthKind::kPlaneZ;
   DepthGrid depth_grid = DepthGrid::kSet;

@@ -82,7 +82,6 @@ void AddHeldOut(const WebPageRequest& request, const DtrSet& set, Figures& figur
   EvaluateRequest evaluate;
   evaluate.set = request.set;
   evaluate.render = request.render;
-  evaluate.threads = request.threads;
   const eval::ViewScore mean = Evaluate(evaluate, request.make_renderer, progress).views.mean;
   if (mean.psnr_db) figures.emplace_back("their PSNR", fmt::format("{:.2f} dB", *mean.psnr_db));
   if (mean.psnr_covered_db) {
@@ -252,7 +251,6 @@ Source Pruned(const WebPageRequest& request, double loss_db, const fs::path& out
   prune.output = output;
   prune.prune.max_loss_db = loss_db;
   prune.prune.render = request.render;
-  prune.threads = request.threads;
   prune.make_renderer = request.make_renderer;
   prune.make_timed_renderer = request.make_timed_renderer;
   PruneSet(prune, progress);

@@ -34,7 +34,6 @@ struct WebPageRequest {
   /// coding alone would cost more; not of sets of several time steps.
   std::function<std::unique_ptr<eval::TimedRenderer>()> make_timed_renderer;
   RenderOptions render;
-  int threads = 0;
 };
 
 struct WebPageReport {

@@ -129,7 +129,6 @@ CalibratedPhotos Calibrated(const ImportRequest& request, const ImportOptions& o
   for (const capture::Photo& photo : photos.photos) {
     calibrate.held_out.push_back(options.held_out.contains(photo.name));
   }
-  calibrate.threads = request.threads;
   calibrate.seed = request.seed;
   calibrate.memory_gb = request.memory_gb;
   calibrate.poses = request.cameras;
@@ -207,7 +206,6 @@ ImportOptions OptionsFor(const ImportRequest& request, CamerasFromFile& cameras,
   options.photo_grid = cameras.list.photo_grid;
   options.distortion_of = DistortionOf;
   options.memory_gb = request.memory_gb;
-  options.threads = request.threads;
   options.completion = request.completion;
   return options;
 }

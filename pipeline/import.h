@@ -30,7 +30,6 @@ struct ImportRequest {
   bool refine = false;                  ///< adjust the cameras, where held-out observations gain
   bool completion = true;               ///< of depth that is imported (CompleteDepth)
   double memory_gb = 4;                 ///< for views in memory at a time
-  int threads = 0;
   std::uint64_t seed = 0;
 };
 

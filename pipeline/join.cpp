@@ -169,7 +169,6 @@ size_t JoinSets(const std::vector<fs::path>& sets, const fs::path& target,
   moving.provenance_json = ProvenanceOf(steps, fingerprint).dump();
   io::LoadOptions load;
   load.sigma = load.held_out = load.completed = true;
-  load.threads = options.threads;
   load.warn = [&](const std::string& line) { progress.Note(line); };
   progress.Stage("joining frames", static_cast<int>(steps.size()));
   for (size_t i = 0; i < steps.size(); ++i) {
@@ -180,11 +179,11 @@ size_t JoinSets(const std::vector<fs::path>& sets, const fs::path& target,
     moving.frames.push_back(WriteViews(steps[i], i, load, moving.unit, writer, progress));
     progress.Update(static_cast<int>(i) + 1);
   }
-  io::StoreStillOnce(writer.folder(), moving, options.threads, kDefaultMemoryGb, progress);
+  io::StoreStillOnce(writer.folder(), moving, kDefaultMemoryGb, progress);
   WriteMeshes(steps, load, writer, moving, progress);
   if (options.video) {
     io::StoreCameraVideos(writer.folder(), writer.work_folder(), moving, *options.video,
-                          options.threads, kDefaultMemoryGb, progress);
+                          kDefaultMemoryGb, progress);
   }
   writer.Finish(moving);
   return steps.size();

@@ -18,7 +18,6 @@ struct JoinOptions {
   /// are decoded, and coded again.
   std::optional<io::VideoQuality> video;
   bool force = false;
-  int threads = 0;
 };
 
 /// Writes `target`, whose time steps are those of `sets`, one set after the other: images and depth

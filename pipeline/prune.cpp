@@ -8,7 +8,6 @@
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/json_number.h"
-#include "dtr/base/parallel_for.h"
 #include "dtr/io/pruned_json.h"
 #include "dtr/io/run_record_json.h"
 #include "dtr/io/set_io.h"
@@ -56,7 +55,6 @@ DtrSet LoadForPruning(const PruneSetOptions& options, Progress& progress) {
   io::LoadOptions load;
   load.held_out = load.completed = true;
   load.collapse_duplicates = false;  // sparse.bin counts the views as they are
-  load.threads = options.threads;
   load.warn = [&](const std::string& line) { progress.Note(line); };
   DtrSet set = io::LoadSet(options.set, load);
   RequireOneFrame(set);
@@ -186,7 +184,6 @@ eval::Times FrameBefore(const PruneSetOptions& options, const DtrSet& set,
   auto times = journal.Find(name, 2);
   if (!times) {
     RenderOptions render = options.prune.render;
-    render.threads = options.threads;
     const eval::Times measured = FrameOf(set, cameras, render, *options.make_timed_renderer());
     times = {measured.median_ms, measured.spread_ms};
     journal.Add(name, *times);
@@ -224,7 +221,6 @@ PruneSetReport PruneSet(const PruneSetOptions& options, Progress& progress) {
   const DtrSet set = LoadForPruning(options, progress);
   io::SetWriter writer(options.output, Fingerprint(options, set), options.force);
   prune::PruneOptions prune = options.prune;
-  prune.render.threads = options.threads;
   prune.other_bytes = static_cast<double>(OtherBytesOf(set, options.set) + kMaxBytesOfReport);
   PruneJournal journal(writer.work_folder() / "measured.jsonl");
   prune.journal = &journal;
@@ -234,8 +230,7 @@ PruneSetReport PruneSet(const PruneSetOptions& options, Progress& progress) {
   if (options.max_bytes) prune.enough_bytes = static_cast<double>(*options.max_bytes);
   if (options.frame_ms)
     prune.enough_frame_share = *options.frame_ms / report.frame_before.median_ms;
-  const ViewCoder coder(set, options.set, writer.work_folder() / "trial", prune.render,
-                        options.threads);
+  const ViewCoder coder(set, options.set, writer.work_folder() / "trial", prune.render);
   report.pruned = prune::Prune(
       set, prune, [&](const prune::Coding& coding) { return coder.Try(coding); },
       options.make_renderer, progress);
@@ -249,7 +244,6 @@ PruneSetReport PruneSet(const PruneSetOptions& options, Progress& progress) {
     DtrSet loaded = pruned;
     io::LoadOptions load;
     load.completed = true;
-    load.threads = options.threads;
     for (View& view : loaded.frames.front().views) {
       if (view.role == ViewRole::kSource) io::LoadPixels(writer.folder(), view, load);
     }
@@ -258,7 +252,7 @@ PruneSetReport PruneSet(const PruneSetOptions& options, Progress& progress) {
   }
   ExpectGoalsReached(options, pruned, report);
   log.End();
-  io::WriteRunRecord(writer.folder(), log.Record(ResolveThreads(options.threads)),
+  io::WriteRunRecord(writer.folder(), log.Record(),
                      {{"frame_before_ms", report.frame_before.median_ms},
                       {"frame_after_ms", report.frame_after.median_ms}});
   writer.Finish(pruned);

@@ -21,7 +21,6 @@ struct PruneSetOptions {
   std::optional<std::uint64_t> max_bytes;
   std::optional<double> frame_ms;  ///< as frame_after is measured
   bool force = false;
-  int threads = 0;
   prune::RendererMaker make_renderer;
   std::string renderer;  ///< its name
   std::function<std::unique_ptr<eval::TimedRenderer>()> make_timed_renderer;

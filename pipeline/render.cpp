@@ -150,11 +150,9 @@ RenderReport Render(const RenderRequest& request,
   RequireMemoryForFrames(request, cameras);
   const eval::RenderFunction draw = make_renderer();
   RenderOptions render = request.render;
-  render.threads = request.threads;
-  DynamicScene moving(request.set, described, request.exclude,
-                      {request.memory_gb, render.threads, request.measured_only,
-                       BytesLeftForViews(request, cameras)},
-                      progress);
+  DynamicScene moving(
+      request.set, described, request.exclude,
+      {request.memory_gb, request.measured_only, BytesLeftForViews(request, cameras)}, progress);
   const auto shown = [&](size_t i) { return FrameShown(request, described, i, cameras.size()); };
   moving.At(shown(0));  // names are checked here
 

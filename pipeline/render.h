@@ -38,7 +38,6 @@ struct RenderRequest {
   bool force = false;          ///< images of several frames may replace files
   bool measured_only = false;  ///< drawn without completed depth
   double memory_gb = 4;        ///< for an image and views' pixels; others are read again
-  int threads = 0;
 
   bool several() const { return play || cameras.several(); }
 };

@@ -65,25 +65,23 @@ std::vector<ImageRgb8> SomeFrames(const fs::path& video, size_t shots) {
   return frames;
 }
 
-void RequireGivenBoardIn(const Layout& layout, const std::string& folder, const calib::Board& board,
-                         int threads) {
+void RequireGivenBoardIn(const Layout& layout, const std::string& folder,
+                         const calib::Board& board) {
   if (layout.shots.empty()) return;
   const Shot& first = layout.shots.front();
   if (first.number < 0) {
-    RequireGivenBoard(
-        folder, board, layout.shots.size(),
-        [&](size_t i) { return io::ReadImage(layout.shots[i].file); }, threads);
+    RequireGivenBoard(folder, board, layout.shots.size(),
+                      [&](size_t i) { return io::ReadImage(layout.shots[i].file); });
     return;
   }
   const size_t shots = layout.shots.size() / layout.cameras.size();
   const auto frames = SomeFrames(first.file, shots);
-  RequireGivenBoard(
-      first.file.string(), board, frames.size(), [&](size_t i) { return frames[i]; }, threads);
+  RequireGivenBoard(first.file.string(), board, frames.size(), [&](size_t i) { return frames[i]; });
 }
 
 // Looks for the board in every shot: photos side by side, videos a few frames at a time.
-void LookAtAll(const calib::Board& board, const calib::DetectOptions& options, int threads,
-               Progress& progress, Layout& layout) {
+void LookAtAll(const calib::Board& board, const calib::DetectOptions& options, Progress& progress,
+               Layout& layout) {
   progress.Stage("looking for the board", static_cast<int>(layout.shots.size()));
   std::atomic<int> done = 0;
   const auto step = [&] {
@@ -100,7 +98,7 @@ void LookAtAll(const calib::Board& board, const calib::DetectOptions& options, i
       videos[shot.file][shot.number] = i;
     }
   }
-  ParallelFor(0, static_cast<int>(photos.size()), threads, [&](int k) {
+  ParallelFor(0, static_cast<int>(photos.size()), [&](int k) {
     Shot& shot = layout.shots[photos[static_cast<size_t>(k)]];
     try {
       Look(io::ReadImage(shot.file), board, options, shot);
@@ -114,7 +112,7 @@ void LookAtAll(const calib::Board& board, const calib::DetectOptions& options, i
     const auto& wanted = entry.second;
     std::vector<std::pair<size_t, ImageRgb8>> pending;
     const auto flush = [&] {
-      ParallelFor(0, static_cast<int>(pending.size()), threads, [&](int k) {
+      ParallelFor(0, static_cast<int>(pending.size()), [&](int k) {
         auto& [index, image] = pending[static_cast<size_t>(k)];
         Look(image, board, options, layout.shots[index]);
         step();
@@ -221,14 +219,14 @@ void AddViewsOf(size_t camera, const fs::path& folder, const calib::Board& board
 }  // namespace
 
 RigPhotos ReadRigPhotos(const fs::path& folder, const calib::Board& board,
-                        const calib::DetectOptions& options, int threads, Progress& progress,
+                        const calib::DetectOptions& options, Progress& progress,
                         const std::map<std::string, calib::LensCamera>& known) {
   Layout layout(RigLayoutOf(folder, progress));
   RigPhotos photos;
   photos.contents = ContentsOfRig(folder, layout);
   progress.Note(capture::LineOf(photos.contents));
-  RequireGivenBoardIn(layout, folder.string(), board, threads);
-  LookAtAll(board, options, threads, progress, layout);
+  RequireGivenBoardIn(layout, folder.string(), board);
+  LookAtAll(board, options, progress, layout);
   photos.left_out = layout.left_out;
   std::map<std::string, size_t> frames;
   const std::vector<size_t> times = FrameTimes(layout.frames);

@@ -42,7 +42,7 @@ struct RigPhotos {
 /// number of threads. Throws UsageError when the folder holds none of these, Error when a camera
 /// has no photo that shows the board.
 RigPhotos ReadRigPhotos(const std::filesystem::path& folder, const calib::Board& board,
-                        const calib::DetectOptions& options, int threads, Progress& progress,
+                        const calib::DetectOptions& options, Progress& progress,
                         const std::map<std::string, calib::LensCamera>& known = {});
 
 }  // namespace dtr::pipeline

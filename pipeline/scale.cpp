@@ -12,7 +12,6 @@
 #include "calib/scale.h"
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
-#include "dtr/base/parallel_for.h"
 #include "dtr/io/pruned.h"
 #include "dtr/io/pruned_json.h"
 #include "dtr/io/run_record.h"
@@ -121,7 +120,7 @@ Found FromGps(const ScaleOptions& options, const DtrSet& set, Progress& progress
 
 Found FromBoard(const ScaleOptions& options, const DtrSet& set, Progress& progress) {
   const calib::Board& board = *options.board;
-  BoardInSet in_set = FindBoard(options.set, set, board, options.threads, progress);
+  BoardInSet in_set = FindBoard(options.set, set, board, progress);
   calib::BoardScale scale = calib::ScaleFromBoard(board, in_set.observations);
   scale.left_out.insert(scale.left_out.end(), in_set.without.begin(), in_set.without.end());
   Found found;
@@ -201,7 +200,6 @@ void CarryDepth(const fs::path& from, View old_view, double scale, View& view, L
   io::LoadOptions load;
   load.images = false;
   load.sigma = true;
-  load.threads = 1;
   io::LoadPixels(from, old_view, load);
   const auto near = static_cast<float>(view.near_z), far = static_cast<float>(view.far_z);
   for (float& z : old_view.depth.grid().data()) {
@@ -267,7 +265,7 @@ ScaleReport ScaleSet(const ScaleOptions& options, Progress& progress) {
                             {"set_sha256", Sha256OfFile(options.set / "set.json")}};
   io::SetWriter writer(report.written, fingerprint.dump(), in_place || options.force);
   WriteViews(options, old_set, found.metric_from_scene.scale, set, writer, progress);
-  WriteMeshes(set, writer, {options.threads, kDefaultMemoryGb}, progress);
+  WriteMeshes(set, writer, kDefaultMemoryGb, progress);
   std::vector<Check> checks;
   if (set.sparse_file) {
     SparseScene sparse = io::LoadSparse(options.set, old_set);
@@ -275,7 +273,7 @@ ScaleReport ScaleSet(const ScaleOptions& options, Progress& progress) {
       point.p_in_world = found.metric_from_scene * point.p_in_world;
     }
     writer.WriteSparse(set, sparse);
-    checks = ValidateSet(writer.folder(), set, sparse, {}, options.threads, progress).tests;
+    checks = ValidateSet(writer.folder(), set, sparse, {}, progress).tests;
   }
   Record(report, set);
   WriteSetPage(writer, set,
@@ -283,11 +281,11 @@ ScaleReport ScaleSet(const ScaleOptions& options, Progress& progress) {
                 .engine = {},
                 .checks = checks,
                 .skipped = {},
-                .room = {options.threads, kDefaultMemoryGb}},
+                .memory_gb = kDefaultMemoryGb},
                progress);
   log.End();
   // What the stages before cost is still what this set cost.
-  io::RunRecord record = log.Record(ResolveThreads(options.threads));
+  io::RunRecord record = log.Record();
   const std::vector<io::RunStage> earlier = io::ReadRunStages(options.set);
   record.stages.insert(record.stages.begin(), earlier.begin(), earlier.end());
   io::WriteRunRecord(writer.folder(), record);

@@ -20,7 +20,6 @@ struct ScaleOptions {
   std::vector<ScaleDistance> distances;  ///< or
   std::filesystem::path gps;  ///< the folder of the set's photos, with GPS in their EXIF; or
   std::optional<calib::Board> board;  ///< that lies in the scene, with a square in metres
-  int threads = 0;
 };
 
 /// A measured distance between two points of the set.

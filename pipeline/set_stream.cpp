@@ -32,7 +32,6 @@ std::unique_ptr<ViewStream> StreamOf(const std::filesystem::path& folder, DtrSet
   ViewStream::Settings settings;
   settings.host_bytes =
       static_cast<size_t>(limits.view_bytes.value_or(limits.memory_gb * kBytesPerGigabyte));
-  settings.threads = limits.threads;
   settings.warn = [&console](const std::string& line) { console.Note(line); };
   io::LoadOptions load;
   load.completed = !limits.measured_only;

@@ -10,10 +10,9 @@
 
 namespace dtr::pipeline {
 
-/// What --memory and --threads say.
+/// What --memory says.
 struct StreamLimits {
   double memory_gb = 4;
-  int threads = 0;
   bool measured_only = false;  ///< without completed depth
   /// What other things leave of memory_gb to the views; absent: all of it.
   std::optional<double> view_bytes = std::nullopt;

@@ -5,7 +5,6 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
-#include "dtr/base/parallel_for.h"
 #include "dtr/eval/json.h"
 #include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
@@ -56,11 +55,10 @@ nlohmann::json HeldOutHashes(const DtrSet& set) {
 }
 
 // The images of the old set in the new one.
-void CopyImages(const std::filesystem::path& from, DtrSet& set, int threads, io::SetWriter& writer,
+void CopyImages(const std::filesystem::path& from, DtrSet& set, io::SetWriter& writer,
                 Progress& progress) {
   io::LoadOptions load;
   load.depth = false;
-  load.threads = threads;
   for (View& view : set.frames.front().views) {
     progress.ThrowIfInterrupted();
     io::LoadPixels(from, view, load);
@@ -106,25 +104,24 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
   if (!options.normals.empty() && !options.force && !writer.resumed()) {
     RequireFree(options.normals, NormalFileNames(set));
   }
-  CopyImages(options.set, set, options.threads, writer, progress);
-  const DepthStageResult stage =
-      DepthStage(set, sparse, options.depth, quality,
-                 {options.threads, options.seed, options.normals}, writer, progress);
+  CopyImages(options.set, set, writer, progress);
+  const DepthStageResult stage = DepthStage(set, sparse, options.depth, quality,
+                                            {options.seed, options.normals}, writer, progress);
   report.prior = stage.prior;
   // What was left out of the former depth says nothing of this.
   if (!io::PrunedJson(set).empty()) {
     progress.Note("the record of what was pruned goes with the depth that was pruned");
     io::SetPrunedJson(set, "");
   }
-  const Room room{options.threads, options.depth.memory_gb.value_or(kDefaultMemoryGb)};
-  FinishScene(set, {}, writer, room, progress);
+  const double memory_gb = options.depth.memory_gb.value_or(kDefaultMemoryGb);
+  FinishScene(set, {}, writer, memory_gb, progress);
   if (options.depth.depth_error_px) {
-    RecodeDepth(set, *options.depth.depth_error_px, writer, room, progress);
+    RecodeDepth(set, *options.depth.depth_error_px, writer, memory_gb, progress);
   }
   if (options.depth.completion) {
-    CompleteDepth(set, sparse, writer, room, progress);
+    CompleteDepth(set, sparse, writer, memory_gb, progress);
   }
-  const DepthCount count = WriteMeshes(set, writer, room, progress);
+  const DepthCount count = WriteMeshes(set, writer, memory_gb, progress);
   writer.WriteSparse(set, sparse);
   nlohmann::ordered_json provenance = nlohmann::ordered_json::parse(set.provenance_json);
   provenance["depth_engine"] = options.depth.engine;
@@ -147,8 +144,7 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
   report.depth_completeness = count.Completeness();
   SetLimits limits;
   limits.memory_gb = std::min(limits.memory_gb, options.depth.memory_gb.value_or(kDefaultMemoryGb));
-  const auto validation =
-      ValidateSet(writer.folder(), set, sparse, limits, options.threads, progress);
+  const auto validation = ValidateSet(writer.folder(), set, sparse, limits, progress);
   set.validation_json =
       eval::ValidationJson(validation.tests);  // other depth, other validation result
   WriteSetPage(writer, set,
@@ -157,11 +153,10 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
                 .checks = validation.tests,
                 .skipped = {},
                 .prior = report.prior,
-                .room = room},
+                .memory_gb = memory_gb},
                progress);
   log.End();
-  io::WriteRunRecord(writer.folder(),
-                     log.Record(ResolveThreads(options.threads), progress.lines()));
+  io::WriteRunRecord(writer.folder(), log.Record(progress.lines()));
   writer.Finish(set);
   return report;
 }

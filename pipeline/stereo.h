@@ -16,7 +16,6 @@ struct RecomputeOptions {
   DepthChoice depth;
   std::filesystem::path normals;  ///< folder for normals (DepthStageOptions); empty: none
   bool force = false;
-  int threads = 0;
   std::uint64_t seed = 0;
 };
 

@@ -41,7 +41,7 @@ Cameras CamerasOf(const DtrSet& set) {
 
 // Appends what depth says, where two views or more have any.
 void AddCrossDepth(const std::filesystem::path& folder, const DtrSet& set, const SetLimits& limits,
-                   int threads, SetValidation& report, Progress& progress) {
+                   SetValidation& report, Progress& progress) {
   std::vector<const View*> with_depth;
   for (const View& view : set.frames.front().views) {
     if (view.depth_file) with_depth.push_back(&view);
@@ -52,7 +52,6 @@ void AddCrossDepth(const std::filesystem::path& folder, const DtrSet& set, const
   options.max_view_cross_px = 2 * limits.max_cross_px;
   options.memory_bytes = static_cast<size_t>(limits.memory_gb * kBytesPerGigabyte);
   options.scene_center = set.scene_center;
-  options.threads = threads;
   progress.Stage("depth across views", static_cast<int>(with_depth.size()));
   std::atomic<int> brought = 0;  // some more than once, where memory is short
   auto cross = eval::CrossDepth(with_depth, options, [&](const View& view) {
@@ -61,7 +60,6 @@ void AddCrossDepth(const std::filesystem::path& folder, const DtrSet& set, const
     loaded.mesh_file.reset();  // renderers' alone
     io::LoadOptions load;
     load.images = false;
-    load.threads = 1;  // several views at a time
     io::LoadPixels(folder, loaded, load);
     progress.Update(std::min(++brought, static_cast<int>(with_depth.size())));
     return std::move(loaded.depth);
@@ -128,19 +126,17 @@ int LeaveOutViewsOfTheRigAlone(calib::Bundle& bundle) {
 }  // namespace
 
 calib::ValidationReport ReprojectionOfSet(const DtrSet& set, const SparseScene& sparse,
-                                          const calib::ValidateLimits& limits, int threads) {
+                                          const calib::ValidateLimits& limits) {
   const Cameras of = CamerasOf(set);
-  return calib::ValidateReprojection(of.cameras, of.poses, sparse, limits, of.names, threads,
-                                     of.held_out);
+  return calib::ValidateReprojection(of.cameras, of.poses, sparse, limits, of.names, of.held_out);
 }
 
 SetValidation ValidateSet(const std::filesystem::path& folder, const DtrSet& set,
-                          const SparseScene& sparse, const SetLimits& limits, int threads,
-                          Progress& progress) {
+                          const SparseScene& sparse, const SetLimits& limits, Progress& progress) {
   progress.Stage("reprojection tests", 0);
-  SetValidation report{{ReprojectionOfSet(set, sparse, limits.reprojection, threads)}, {}, {}};
+  SetValidation report{{ReprojectionOfSet(set, sparse, limits.reprojection)}, {}, {}};
   progress.ThrowIfInterrupted();
-  AddCrossDepth(folder, set, limits, threads, report, progress);
+  AddCrossDepth(folder, set, limits, report, progress);
   progress.Stage("cameras against their observations", 0);
   const Cameras of = CamerasOf(set);
   const auto rig = RigOfSet(set);
@@ -149,7 +145,7 @@ SetValidation ValidateSet(const std::filesystem::path& folder, const DtrSet& set
   const int by_rig = panoramas ? LeaveOutViewsOfTheRigAlone(bundle) : 0;
   calib::BundleLimits photos = limits.photos;
   photos.lenses_are_given = photos.lenses_are_given || rig.has_value();
-  calib::PhotosValidation validation = calib::ValidatePhotos(bundle, photos, threads, &progress);
+  calib::PhotosValidation validation = calib::ValidatePhotos(bundle, photos, &progress);
   if (panoramas) {  // it is that of free views: those of a panorama are known far better
     std::erase_if(validation.tests,
                   [](const Check& test) { return test.name == "image_shift_px"; });

@@ -17,7 +17,7 @@ namespace dtr::pipeline {
 /// observations (--holdout-strict, or cameras from a list). Views of `sparse` are indices
 /// into that frame. Pixels need not be loaded.
 calib::ValidationReport ReprojectionOfSet(const DtrSet& set, const SparseScene& sparse,
-                                          const calib::ValidateLimits& limits, int threads);
+                                          const calib::ValidateLimits& limits);
 
 struct SetLimits {
   calib::ValidateLimits reprojection;
@@ -45,8 +45,7 @@ std::string ToJson(const SetValidation& report);
 /// depth, it is carried into the neighbours and back; their maps are read from `folder`, as many at
 /// a time as memory_gb holds (one with its neighbours where it holds less).
 SetValidation ValidateSet(const std::filesystem::path& folder, const DtrSet& set,
-                          const SparseScene& sparse, const SetLimits& limits, int threads,
-                          Progress& progress);
+                          const SparseScene& sparse, const SetLimits& limits, Progress& progress);
 
 /// That as a page. Result and tests; a table of the views; for every size of image, all views
 /// together: residual vectors, coverage, and how uncertain the image is where the fresh bundle

@@ -30,9 +30,9 @@ void RequireSize(const calib::CalibratedCamera& camera, int width_px, int height
 
 TestPhotos TestPhotosOfCamera(const calib::Calibration& calibration,
                               const std::filesystem::path& folder, const std::string& pattern,
-                              int threads, Progress& progress) {
-  const BoardPhotos photos = ReadBoardPhotos(folder, pattern, calibration.board, {}, threads,
-                                             progress, calibration.cameras[0].camera);
+                              Progress& progress) {
+  const BoardPhotos photos = ReadBoardPhotos(folder, pattern, calibration.board, {}, progress,
+                                             calibration.cameras[0].camera);
   RequireSize(calibration.cameras[0], photos.width_px, photos.height_px, folder);
   TestPhotos found{{}, photos.left_out};
   calib::TestViews& test_views = found.test_views;
@@ -43,7 +43,7 @@ TestPhotos TestPhotosOfCamera(const calib::Calibration& calibration,
 
 TestPhotos TestPhotosOfRig(const calib::Calibration& calibration,
                            const std::filesystem::path& folder, const std::string& pattern,
-                           int threads, Progress& progress) {
+                           Progress& progress) {
   if (pattern != "*") {
     throw UsageError(fmt::format(
         "`pattern` {}: is for the photos of one camera; a rig's cameras are distinguished by their "
@@ -52,7 +52,7 @@ TestPhotos TestPhotosOfRig(const calib::Calibration& calibration,
   }
   std::map<std::string, calib::LensCamera> known;
   for (const auto& camera : calibration.cameras) known.emplace(camera.name, camera.camera);
-  RigPhotos photos = ReadRigPhotos(folder, calibration.board, {}, threads, progress, known);
+  RigPhotos photos = ReadRigPhotos(folder, calibration.board, {}, progress, known);
   std::vector<size_t> index(photos.cameras.size());
   for (size_t c = 0; c < photos.cameras.size(); ++c) {
     const auto found =
@@ -158,10 +158,10 @@ calib::Calibration ForeignCalibration(const std::filesystem::path& file,
 
 TestPhotos ReadTestPhotos(const calib::Calibration& calibration,
                           const std::filesystem::path& folder, const std::string& pattern,
-                          int threads, Progress& progress) {
+                          Progress& progress) {
   TestPhotos photos = calibration.cameras.size() == 1
-                          ? TestPhotosOfCamera(calibration, folder, pattern, threads, progress)
-                          : TestPhotosOfRig(calibration, folder, pattern, threads, progress);
+                          ? TestPhotosOfCamera(calibration, folder, pattern, progress)
+                          : TestPhotosOfRig(calibration, folder, pattern, progress);
   const std::vector<calib::LeftOut> seen = TakeOutSeen(calibration, photos.test_views.views);
   if (photos.test_views.views.empty()) {
     throw Error(fmt::format(

@@ -33,7 +33,7 @@ struct TestPhotos {
 /// differ from the calibration's, a camera is not there or nothing is left.
 TestPhotos ReadTestPhotos(const calib::Calibration& calibration,
                           const std::filesystem::path& folder, const std::string& pattern,
-                          int threads, Progress& progress);
+                          Progress& progress);
 
 /// The report as a page: validation result and tests, residual vectors, coverage, maps, worst
 /// views. Views are drawn over their photos where `images` has them.

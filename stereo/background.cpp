@@ -111,13 +111,13 @@ void SumAlong(const std::vector<float>& values, std::vector<float>* sums) {
 
 }  // namespace
 
-double NoiseOverTime(const ViewOverTime& view, int threads) {
+double NoiseOverTime(const ViewOverTime& view) {
   RequireSameSize(view);
   if (view.images.size() < 2) return 0;
   const int rows = view.images.front().height() / kBlock, width = view.images.front().width();
   constexpr int kLargest = 3 * kBlock * kBlock * 255;
   std::vector<std::vector<long>> counts(static_cast<size_t>(rows));
-  ParallelFor(0, rows, threads, [&](int row) {
+  ParallelFor(0, rows, [&](int row) {
     std::vector<long>& own = counts[static_cast<size_t>(row)];
     own.assign(kLargest + 1, 0);
     const int y = row * kBlock;
@@ -150,13 +150,13 @@ double NoiseOverTime(const ViewOverTime& view, int threads) {
   return std::max(deviation, std::sqrt(kRounding));
 }
 
-Background FindBackground(const ViewOverTime& view, int threads) {
+Background FindBackground(const ViewOverTime& view) {
   RequireSameSize(view);
   const int w = view.images.front().width(), h = view.images.front().height();
-  Background background{ImageRgb8(w, h, 3), Grid<std::uint8_t>(w, h), NoiseOverTime(view, threads)};
+  Background background{ImageRgb8(w, h, 3), Grid<std::uint8_t>(w, h), NoiseOverTime(view)};
   const double variance = background.noise * background.noise;
   const auto farthest = static_cast<int>(std::ceil(2 * variance * kAgreeing));
-  ParallelFor(0, h, threads, [&](int y) {
+  ParallelFor(0, h, [&](int y) {
     std::array<std::uint8_t, 3> colour{};
     for (int x = 0; x < w; ++x) {
       const int support = ColourOfMost(view, x, y, farthest, &colour);
@@ -167,8 +167,7 @@ Background FindBackground(const ViewOverTime& view, int threads) {
   return background;
 }
 
-Mask ChangedPixels(const ImageRgb8& image, const Mask& usable, const Background& background,
-                   int threads) {
+Mask ChangedPixels(const ImageRgb8& image, const Mask& usable, const Background& background) {
   const int w = image.width(), h = image.height();
   if (w != background.image.width() || h != background.image.height()) {
     throw std::invalid_argument("background: expected an image of its size");
@@ -176,7 +175,7 @@ Mask ChangedPixels(const ImageRgb8& image, const Mask& usable, const Background&
   const double variance = background.noise * background.noise;
   // Sums along rows first; a pixel without a background is as good as changed.
   Grid<float> sums(w, h), counts(w, h), unknown(w, h);
-  ParallelFor(0, h, threads, [&](int y) {
+  ParallelFor(0, h, [&](int y) {
     const auto width = static_cast<size_t>(w);
     std::vector<float> difference(width, 0), counted(width, 0), lost(width, 0), along(width);
     for (int x = 0; x < w; ++x) {
@@ -196,7 +195,7 @@ Mask ChangedPixels(const ImageRgb8& image, const Mask& usable, const Background&
     }
   });
   Mask changed(w, h);
-  ParallelFor(0, h, threads, [&](int y) {
+  ParallelFor(0, h, [&](int y) {
     for (int x = 0; x < w; ++x) {
       float sum = 0, count = 0, lost = 0;
       for (int j = std::max(0, y - kWindowRadius); j <= std::min(h - 1, y + kWindowRadius); ++j) {

@@ -80,8 +80,7 @@ class Instrument {
 
 DepthEstimate FilterByConsistency(const StereoView& view, const DepthEstimate& estimate,
                                   std::span<const OtherDepth> others,
-                                  const ConsistencyOptions& options, int threads,
-                                  const Mask* wanted) {
+                                  const ConsistencyOptions& options, const Mask* wanted) {
   if (options.min_agreeing <= 0) return estimate;
   std::vector<Checker> checkers;
   for (const OtherDepth& other : others) {
@@ -94,7 +93,7 @@ DepthEstimate FilterByConsistency(const StereoView& view, const DepthEstimate& e
   const std::optional<Instrument> instrument =
       view.prior != nullptr ? std::optional<Instrument>(*view.prior) : std::nullopt;
   DepthEstimate result = estimate;
-  ParallelFor(0, estimate.depth.height(), threads, [&](int y) {
+  ParallelFor(0, estimate.depth.height(), [&](int y) {
     for (int x = 0; x < estimate.depth.width(); ++x) {
       const float z = estimate.depth(x, y);
       if (DepthImage::IsHole(z)) continue;

@@ -29,7 +29,6 @@ struct OtherDepth {
 /// Only the unfiltered inputs are read, so the order in which views are filtered has no influence.
 DepthEstimate FilterByConsistency(const StereoView& view, const DepthEstimate& estimate,
                                   std::span<const OtherDepth> others,
-                                  const ConsistencyOptions& options, int threads,
-                                  const Mask* wanted = nullptr);
+                                  const ConsistencyOptions& options, const Mask* wanted = nullptr);
 
 }  // namespace dtr::stereo

@@ -87,8 +87,7 @@ class Run {
   int AtOnce(const std::vector<int>& views) {
     const int at_once = ViewsAtOnce(Together(), views, Filters());
     if (at_once > 1 || Limited()) return at_once;
-    return std::max(
-        1, ResolveThreads(options_.engine.threads) / std::max(1, options_.neighbours.count));
+    return std::max(1, ThreadLimit::Current() / std::max(1, options_.neighbours.count));
   }
   bool Limited() const { return options_.memory_bytes > 0 || options_.load_pixels != nullptr; }
   bool IsOfPart(int view) const {
@@ -154,7 +153,7 @@ class Run {
     engine_options.memory_gb /= static_cast<double>(batch.size());
     std::vector<std::string> notes(batch.size());
     const auto count = static_cast<int>(batch.size());
-    ParallelFor(0, count, count, [&](int i) {
+    ParallelFor(0, count, [&](int i) {
       progress_.ThrowIfInterrupted();
       const auto k = static_cast<size_t>(i);
       estimates_.Save(batch[k], EstimateOne(batch[k], engine_options, &notes[k]));
@@ -215,7 +214,7 @@ class Run {
     const Pages::Reservation result(pages_,
                                     kResultCopies * EstimateBytes(of.camera) + OtherBytes(of));
     const auto time_step = of.time_step != nullptr ? of.time_step->load() : nullptr;
-    return FilterByConsistency(of, *own, others, options_.consistency, options_.engine.threads,
+    return FilterByConsistency(of, *own, others, options_.consistency,
                                time_step ? &time_step->open : nullptr);
   }
 

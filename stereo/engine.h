@@ -52,7 +52,6 @@ struct QualitySettings {
 };
 
 struct EngineOptions {
-  int threads = 0;         ///< 0: all cores; the result does not depend on it
   std::uint64_t seed = 0;  ///< for engines that draw random numbers
   bool look = false;       ///< the result is looked at and not kept: less work will do
   double memory_gb = 2.0;  ///< fewer threads run rather than use more; no effect on the result

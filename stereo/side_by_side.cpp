@@ -10,7 +10,7 @@
 namespace dtr::stereo {
 
 int ViewsAtOnce(const Collection& c, std::span<const int> views, bool filters) {
-  const int threads = ResolveThreads(c.options.threads);
+  const int threads = ThreadLimit::Current();
   std::uint64_t largest = 1;
   for (const int v : views) {
     const std::span<const int> neighbours = c.neighbours[static_cast<size_t>(v)].views;

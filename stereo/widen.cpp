@@ -21,8 +21,8 @@ std::vector<SmallView> SmallViews(const Collection& c, Progress& progress) {
   std::uint64_t largest = 1;
   for (const StereoView& view : c.views) largest = std::max(largest, PixelBytes(view.camera));
   const std::uint64_t fit = c.pages->limit() / (Pages::kLoadingCopies * largest);
-  const int at_once = static_cast<int>(std::clamp<std::uint64_t>(
-      fit, 1, static_cast<std::uint64_t>(ResolveThreads(c.options.threads))));
+  const int at_once = static_cast<int>(
+      std::clamp<std::uint64_t>(fit, 1, static_cast<std::uint64_t>(ThreadLimit::Current())));
   ParallelFor(0, static_cast<int>(c.views.size()), at_once, [&](int v) {
     progress.ThrowIfInterrupted();
     const ViewsAround alone(c.views, c.load_pixels, *c.pages, v, {});
@@ -35,7 +35,7 @@ std::vector<SmallView> SmallViews(const Collection& c, Progress& progress) {
 /// The small images are all in memory, and what an engine takes for one is little.
 int LooksAtOnce(const Collection& c, std::span<const StereoView> views) {
   const bool says = !views.empty() && c.engine->WorkBytes(views, 0, c.neighbours[0].views) > 0;
-  return says ? ResolveThreads(c.options.threads) : 1;
+  return says ? ThreadLimit::Current() : 1;
 }
 
 /// Moves the ends that too many depths lie at; false when there is none.

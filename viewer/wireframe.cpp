@@ -120,11 +120,11 @@ void Wireframe::Keep(const Drawn& drawn) {
     }
   }
   std::vector<Kept> made(missing.size());
-  ParallelFor(0, static_cast<int>(missing.size()), options.threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(missing.size()), [&](int i) {
     const auto k = static_cast<size_t>(i);
     const View& view = *missing[k];
     std::string unfit;  // the renderer has said so
-    const AdaptiveMesh mesh = MakeAdaptiveMesh(view, options, 1, unfit);
+    const AdaptiveMesh mesh = MakeAdaptiveMesh(view, options, unfit);
     made[k] = {options.resolution, MeshRuleOf(view, options), view.depth.grid().data().data(),
                PointsOf(mesh, view), EdgesOf(mesh)};
   });
@@ -144,17 +144,16 @@ ImageRgb8 Wireframe::Draw(const Drawn& drawn) {
     std::vector<End> ends(mesh.points.size());
     constexpr int kPointsTogether = 4096;
     const auto points = static_cast<int>(mesh.points.size());
-    ParallelFor(0, (points + kPointsTogether - 1) / kPointsTogether, drawn.options.threads,
-                [&](int piece) {
-                  const int end = std::min(points, (piece + 1) * kPointsTogether);
-                  for (int i = piece * kPointsTogether; i < end; ++i) {
-                    const auto p = static_cast<size_t>(i);
-                    ends[p] = Project(drawn.camera, mesh.points[p]);
-                  }
-                });
+    ParallelFor(0, (points + kPointsTogether - 1) / kPointsTogether, [&](int piece) {
+      const int end = std::min(points, (piece + 1) * kPointsTogether);
+      for (int i = piece * kPointsTogether; i < end; ++i) {
+        const auto p = static_cast<size_t>(i);
+        ends[p] = Project(drawn.camera, mesh.points[p]);
+      }
+    });
     const Pen pen{drawn.result.depth, image, ThresholdsOf(view, drawn.options).delta,
                   drawn.colours.Of(view)};
-    ParallelFor(0, bands, drawn.options.threads, [&](int band) {
+    ParallelFor(0, bands, [&](int band) {
       const Rows rows{band * kRowsTogether, std::min(height, (band + 1) * kRowsTogether)};
       for (const auto& [a, b] : mesh.edges) {
         if (ends[a].in_front && ends[b].in_front) pen.Line(ends[a], ends[b], rows);

@@ -69,7 +69,6 @@ struct AdjustOptions {
   /// The lenses that the two above speak of, as many as the bundle has; null: those of the start.
   /// With them, a solve can start from another's result. Borrowed.
   const std::vector<LensCamera>* known_lenses = nullptr;
-  int threads = 1;  ///< 0: all cores; the result is the same. Ceres uses one
   /// Solve by Ceres what plain/plain_adjust.h can solve, too: the reference of its tests.
   bool by_ceres = false;
   /// Asked after every iteration whether to stop: Interrupted is thrown then. Null: unset.

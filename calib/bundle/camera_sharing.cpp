@@ -85,7 +85,7 @@ class Comparison {
     const Bundle some = SomePoints(BundleOf(Merged(model_, groups)), kMaxPoints, options_.seed);
     const std::vector<PointFold> folds = PointFolds(some, options_.seed);
     std::vector<Trial> halves(folds.size());
-    ParallelFor(0, static_cast<int>(folds.size()), options_.threads, [&](int i) {
+    ParallelFor(0, static_cast<int>(folds.size()), [&](int i) {
       const auto at = static_cast<size_t>(i);
       const Adjusted trained = Adjust(folds[at].training, adjust_);
       halves[at] = {LossesOfHeldOutPoints(trained.bundle, folds[at].asked, scale_px_),

@@ -11,7 +11,6 @@
 namespace dtr::calib {
 
 struct SharingOptions {
-  int threads = 0;
   std::uint64_t seed = 0;              ///< of the points that are held out
   const Progress* progress = nullptr;  ///< asked whether to stop
 };

@@ -46,7 +46,6 @@ bool HasPriors(const RefineOptions& options) {
 AdjustOptions SolveOptions(const RefineOptions& options, const std::optional<LensFreedom>& lens) {
   AdjustOptions adjust = OptionsFor(lens);
   adjust.progress = options.progress;
-  adjust.threads = options.threads;
   if (adjust.fix_poses) return adjust;
   adjust.aspect_sigma = kKnownAspectSigma;
   // Principal points of their own for all images make a solve nearly projective.
@@ -186,14 +185,12 @@ std::vector<Losses> TryOnUnseenPoints(const Bundle& bundle, const RefineOptions&
   std::vector<std::vector<double>> parts(candidates.size() * folds.size());
   std::vector<char> converged(parts.size());
   const int folds_at_once = static_cast<int>(folds.size());
-  const int threads = std::max(1, ResolveThreads(options.threads) / folds_at_once);
-  ParallelFor(0, folds_at_once, options.threads, [&](int i) {
+  ParallelFor(0, folds_at_once, [&](int i) {
     const PointFold& fold = folds[static_cast<size_t>(i)];
     std::vector<Adjusted> trained(candidates.size());
     for (size_t k = 0; k < candidates.size(); ++k) {
       const Adjusted* const less = k > 0 ? &trained[LastWithin(candidates, k)] : nullptr;
       AdjustOptions solve = SolveOptions(options, candidates[k].lens);
-      solve.threads = threads;
       trained[k] = Train(fold.training, solve, less);
       const size_t at = k * folds.size() + static_cast<size_t>(i);
       converged[at] = trained[k].converged;

@@ -28,7 +28,6 @@ struct RefineOptions {
   std::string determined;
   /// What helps where it does not; empty: more views, or a camera that is known.
   std::string advice = {};
-  int threads = 0;
   std::uint64_t seed = 0;  ///< of the observations that are held out
   /// AdjustOptions::progress of every solve, each of which is a stage; may be null.
   Progress* progress = nullptr;

@@ -13,6 +13,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/memory_budget.h"
 #include "dtr/base/order_statistics.h"
+#include "dtr/base/parallel_for.h"
 
 namespace dtr::colmap {
 namespace {
@@ -156,8 +157,8 @@ std::vector<double> FirstGuess(calib::CameraModel model, const SfmImageInput& im
   return params;
 }
 
-ExtractionPlan PlanExtraction(const std::vector<SfmImageInput>& images, int threads,
-                              double memory_gb, int requested_side_px) {
+ExtractionPlan PlanExtraction(const std::vector<SfmImageInput>& images, double memory_gb, ,
+                              int requested_side_px) {
   const double limit_mib = kFill * memory_gb * kBytesPerGigabyte / kMib;
   const LargestImage largest = LargestOf(images);
   ExtractionPlan plan;
@@ -176,7 +177,7 @@ ExtractionPlan PlanExtraction(const std::vector<SfmImageInput>& images, int thre
         std::ceil(kShown * peak(side_px, 1) * kMib / kFill / kBytesPerGigabyte) / kShown));
   }
   plan.max_image_size_px = static_cast<int>(side_px);
-  plan.threads = std::clamp(threads, 1, static_cast<int>(images.size()));
+  plan.threads = std::clamp(ThreadLimit::Current(), 1, static_cast<int>(images.size()));
   while (plan.threads > 1 && peak(side_px, plan.threads) > limit_mib) --plan.threads;
   plan.expected_peak_gib = peak(side_px, plan.threads) / 1024;
   return plan;

@@ -34,10 +34,10 @@ inline constexpr int kPreferredSidePx = 2400;
 inline constexpr int kSmallestSidePx = 640;
 
 /// Chooses threads and size: the size first (`requested_side_px`, or kPreferredSidePx when 0), then
-/// as many of `threads` as fit; when not even one fits, the largest size at which one does.
+/// as many threads as fit; when not even one fits, the largest size at which one does.
 /// Throws UsageError when memory_gb does not suffice for kSmallestSidePx.
-ExtractionPlan PlanExtraction(const std::vector<SfmImageInput>& images, int threads,
-                              double memory_gb, int requested_side_px);
+ExtractionPlan PlanExtraction(const std::vector<SfmImageInput>& images, double memory_gb, ,
+                              int requested_side_px);
 
 /// Photos that share one camera of the database.
 struct CameraGroup {

@@ -46,7 +46,7 @@ class SmallSources {
  public:
   explicit SmallSources(const Frozen& frozen) : files_(frozen.files) {}
   std::span<const SmallFeatures> Features(Progress& progress) {
-    std::call_once(once_, [&] { features_ = SmallFeaturesOfFiles(files_, 1, 0, progress); });
+    std::call_once(once_, [&] { features_ = SmallFeaturesOfFiles(files_, 0, progress); });
     return features_;
   }
 
@@ -196,12 +196,12 @@ void KeepFrozenPoints(const calib::SfmModel& model, calib::SfmImage& image) {
 Placed Place(const fs::path& images_dir, const SfmImageInput& photo, const Frozen& frozen,
              SmallSources& small, const fs::path& folder, const SfmOptions& options,
              Progress& progress) {
-  Workspace workspace(folder, images_dir, std::span(&photo, 1), kAliasPrefix, 1, progress,
+  Workspace workspace(folder, images_dir, std::span(&photo, 1), kAliasPrefix, progress,
                       options.engine);
   auto groups = GroupCameras(workspace.images(), CameraModelOf(options), true);
   groups.front().camera_id = SharedCamera(frozen, photo, options.share_intrinsics_within_group);
   ExtractionPlan plan =
-      PlanExtraction(workspace.images(), 1, options.memory_gb, options.max_image_size_px);
+      PlanExtraction(workspace.images(), options.memory_gb, options.max_image_size_px);
   plan.max_features = options.max_features;  // as the sources', which `frozen` vouches for
   const auto inputs =
       fmt::format("model {} size {} seed {} {} [{}]{}", frozen.fingerprint, plan.max_image_size_px,
@@ -306,15 +306,14 @@ HeldOutResult RegisterHeldOut(const fs::path& images_dir, std::span<const SfmIma
   std::sort(photos.begin(), photos.end(),
             [](const auto& a, const auto& b) { return a.name < b.name; });
   // One photo per thread, each with one thread of its own: as many as the memory allows at once.
-  const int threads = photos.empty() ? 1
-                                     : PlanExtraction(photos, ResolveThreads(options.threads),
-                                                      options.memory_gb, options.max_image_size_px)
-                                           .threads;
+  const int at_once =
+      photos.empty() ? 1
+                     : PlanExtraction(photos, options.memory_gb, options.max_image_size_px).threads;
   SmallSources small(frozen);
   std::vector<Placed> placed(photos.size());
   progress.Stage("registering held-out photos", static_cast<int>(photos.size()));
   std::atomic<int> done = 0;
-  ParallelFor(0, static_cast<int>(photos.size()), threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(photos.size()), at_once, [&](int i) {
     const auto index = static_cast<size_t>(i);
     // Its own stages would tangle with those of the photos beside it.
     QuietProgress quiet(progress);

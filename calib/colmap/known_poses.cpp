@@ -153,7 +153,7 @@ void Triangulate(Workspace& workspace, const KnownCameras& known, const SfmOptio
       .Add({"image_path"}, workspace.images_folder().string())
       .Add({"input_path"}, input.string())
       .Add({"output_path"}, output.string())
-      .Add({"Mapper.num_threads"}, std::to_string(workspace.threads()))
+      .Add({"Mapper.num_threads"}, std::to_string(ThreadLimit::Current()))
       .Add({"Mapper.ba_refine_focal_length"}, "0")
       .Add({"Mapper.ba_refine_principal_point"}, "0")
       .Add({"Mapper.ba_refine_extra_params"}, "0")
@@ -195,7 +195,7 @@ void TriangulateHere(Workspace& workspace, const KnownCameras& known) {
     for (size_t c = 0; c < graph.cameras.size(); ++c) {
       graph.cameras[c] = known.model.cameras.at(static_cast<std::uint32_t>(c + 1));
     }
-    calib::SfmModel found = sfm::TriangulateMatches(graph, poses, workspace.threads());
+    calib::SfmModel found = sfm::TriangulateMatches(graph, poses);
     ColourPoints(workspace, found);
     WriteModel(workspace.folder() / "model", WithGivenCameras(known, std::move(found)),
                Format::kBinary);
@@ -251,8 +251,8 @@ std::vector<calib::MatchedPair> MatchWithoutCameras(const fs::path& images_dir,
   SfmOptions options = given;
   options.engine = SfmEngine::kGlobal;
   const std::vector<SfmImageInput> inputs = InputsOf(images);
-  Workspace workspace(workspace_folder, images_dir, inputs, "", ResolveThreads(options.threads),
-                      progress, options.engine, options.folder_is_shared);
+  Workspace workspace(workspace_folder, images_dir, inputs, "", progress, options.engine,
+                      options.folder_is_shared);
   SfmReport report;
   FeaturesAndMatches(workspace, GroupCameras(workspace.images(), CameraModelOf(options), true),
                      options, report);
@@ -268,9 +268,8 @@ SfmResult TriangulateWithPoses(const fs::path& images_dir, std::span<const Posed
   }
   if (options.engine == SfmEngine::kColmap) RequireColmapsModels(images);
   const KnownCameras known = Arranged(images);
-  Workspace workspace(workspace_folder, images_dir, InputsOf(known.images), "",
-                      ResolveThreads(options.threads), progress, options.engine,
-                      options.folder_is_shared);
+  Workspace workspace(workspace_folder, images_dir, InputsOf(known.images), "", progress,
+                      options.engine, options.folder_is_shared);
   if (options.part && options.part->stage == SfmStage::kPhotos) throw PartDone();
   SfmResult result;
   // Where no pair could overlap the cameras are doubtful: the photos themselves are asked then.

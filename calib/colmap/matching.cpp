@@ -7,6 +7,7 @@
 
 #include "calib/colmap/features.h"
 #include "calib/colmap/pairs.h"
+#include "dtr/base/parallel_for.h"
 
 namespace dtr::colmap {
 namespace {
@@ -51,7 +52,7 @@ std::optional<ImagePairs> PairsToMatch(Workspace& workspace, Matching matching, 
   if (matching != Matching::kPreselected) return {};
   std::vector<std::filesystem::path> files;
   for (size_t i = 0; i < count; ++i) files.push_back(workspace.FileOf(i));
-  ImagePairs pairs = PreselectPairs(files, workspace.threads(), memory_gb, workspace.progress());
+  ImagePairs pairs = PreselectPairs(files, memory_gb, workspace.progress());
   if (allowed) {
     std::erase_if(pairs, [&](const auto& pair) {
       return !std::binary_search(allowed->begin(), allowed->end(), pair);
@@ -73,8 +74,8 @@ Matching ResolveMatching(Matching matching, size_t images) {
   return images <= kExhaustiveLimit ? Matching::kExhaustive : Matching::kPreselected;
 }
 
-int MatchingThreads(int threads, double memory_gb) {
-  return std::clamp(static_cast<int>(kFill * memory_gb / kMatcherGib), 1, threads);
+int MatchingThreads(double memory_gb) {
+  return std::clamp(static_cast<int>(kFill * memory_gb / kMatcherGib), 1, ThreadLimit::Current());
 }
 
 int MatchingPercent(const std::string& line) {
@@ -106,7 +107,7 @@ void MatchPairs(Workspace& workspace, const std::filesystem::path& database,
 
 void MatchPhotos(Workspace& workspace, const std::filesystem::path& database, Matching matching,
                  double memory_gb, std::uint64_t seed, const std::optional<ImagePairs>& allowed) {
-  const int threads = MatchingThreads(workspace.threads(), memory_gb);
+  const int threads = MatchingThreads(memory_gb);
   if (const auto pairs = PairsToMatch(workspace, matching, memory_gb, allowed)) {
     std::vector<std::pair<std::string, std::string>> names;
     for (const auto& [a, b] : *pairs)

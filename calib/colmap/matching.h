@@ -32,6 +32,6 @@ int MatchingPercent(const std::string& line);
 
 /// Threads for the matchers within the memory limit. Each holds the distances of two photos'
 /// features: 8192 x 8192 floats at COLMAP's limit, doubled for features with two orientations.
-int MatchingThreads(int threads, double memory_gb);
+int MatchingThreads(double memory_gb);
 
 }  // namespace dtr::colmap

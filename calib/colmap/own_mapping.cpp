@@ -52,7 +52,6 @@ Undetermined UndeterminedOf(Workspace& workspace, const calib::SfmModel& model,
   });
   if (!suspicious && LackOfParallax(CountPairs(workspace)).empty()) return {};
   calib::RefineOptions refine;
-  refine.threads = options.threads;
   refine.seed = options.seed;
   refine.progress = &workspace.progress();
   if (options.intrinsics_are_known) refine.known_lenses = model.cameras;
@@ -86,7 +85,7 @@ std::optional<Doubtful> DropContradicted(Workspace& workspace,
     if (is_exifs) graph.focal_is_known[i] = 0;
   }
   for (sfm::GraphImage& image : graph.images) image.name = workspace.NameOfAlias(image.name);
-  std::string why = sfm::WhyContradicted(graph, colmaps.front(), workspace.threads());
+  std::string why = sfm::WhyContradicted(graph, colmaps.front());
   if (why.empty()) return std::nullopt;
   Doubtful dropped{std::move(colmaps.front()), std::move(why), true};
   colmaps.clear();

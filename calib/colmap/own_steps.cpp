@@ -232,7 +232,6 @@ void OwnMatches(Workspace& workspace, const fs::path& features,
     photos.back().features.keypoints = ReadKeypoints(features, IdOf(i));
   }
   sfm::MatchOptions match;
-  match.threads = workspace.threads();
   match.seed = options.seed;
   match.lens_is_known.assign(known.lenses.size(), known_lenses);
   match.pairs = PairsFor(workspace.images(), matching, allowed);
@@ -282,8 +281,7 @@ GloballyMapped MapHere(Workspace& workspace, const SfmOptions& options,
   SetStations(workspace, &graph);
   GloballyMapped result;
   workspace.RunHere([&] {
-    sfm::Mapped mapped = sfm::MapGlobally(graph, {.threads = workspace.threads(),
-                                                  .seed = options.seed,
+    sfm::Mapped mapped = sfm::MapGlobally(graph, {.seed = options.seed,
                                                   .intrinsics_are_known = fixed.has_value(),
                                                   .focals_are_known = focals_hold,
                                                   .progress = &workspace.progress()});

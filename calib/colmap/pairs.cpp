@@ -121,14 +121,13 @@ std::vector<size_t> Partners(const std::vector<int>& scores) {
 }
 
 std::vector<std::pair<size_t, size_t>> PreselectPairs(std::span<const std::filesystem::path> files,
-                                                      int threads, double memory_gb,
-                                                      Progress& progress) {
-  const auto features = SmallFeaturesOfFiles(files, threads, memory_gb, progress);
+                                                      double memory_gb, Progress& progress) {
+  const auto features = SmallFeaturesOfFiles(files, memory_gb, progress);
   const size_t count = files.size();
   std::vector<std::vector<int>> scores(count, std::vector<int>(count, 0));
   progress.Stage("comparing small images", static_cast<int>(count));
   std::atomic<int> done = 0;
-  ParallelFor(0, static_cast<int>(count), threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(count), [&](int i) {
     progress.ThrowIfInterrupted();
     const auto a = static_cast<size_t>(i);
     for (size_t b = a + 1; b < count; ++b) scores[a][b] = Resemblance(features[a], features[b]);
@@ -146,12 +145,12 @@ std::vector<std::pair<size_t, size_t>> PreselectPairs(std::span<const std::files
 }
 
 std::vector<SmallFeatures> SmallFeaturesOfFiles(std::span<const std::filesystem::path> files,
-                                                int threads, double memory_gb, Progress& progress) {
+                                                double memory_gb, Progress& progress) {
   std::vector<SmallFeatures> features(files.size());
   MemoryBudget memory(memory_gb);
   progress.Stage("small images", static_cast<int>(files.size()));
   std::atomic<int> done = 0;
-  ParallelFor(0, static_cast<int>(files.size()), threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(files.size()), [&](int i) {
     progress.ThrowIfInterrupted();
     const auto index = static_cast<size_t>(i);
     const io::ImageHeader header = io::ReadImageHeader(files[index], memory_gb);

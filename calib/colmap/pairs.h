@@ -44,13 +44,12 @@ std::vector<size_t> Partners(const std::vector<int>& scores);
 /// As many photos at a time are held as fit into `memory_gb` (GB of 1e9 bytes), one at least; 0: no
 /// bound. Deterministic for any number of threads. Throws Error when a photo cannot be read.
 std::vector<std::pair<size_t, size_t>> PreselectPairs(std::span<const std::filesystem::path> files,
-                                                      int threads, double memory_gb,
-                                                      Progress& progress);
+                                                      double memory_gb, Progress& progress);
 
 /// SmallFeaturesOf each of the photos, under the bound of PreselectPairs.
 /// Throws Error when a photo cannot be read.
 std::vector<SmallFeatures> SmallFeaturesOfFiles(std::span<const std::filesystem::path> files,
-                                                int threads, double memory_gb, Progress& progress);
+                                                double memory_gb, Progress& progress);
 
 /// Indices (sorted) of the at most kNeighbours of `others` that resemble a photo most.
 std::vector<size_t> MostResembling(const SmallFeatures& photo,

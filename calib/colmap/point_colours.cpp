@@ -37,7 +37,7 @@ void ColourPoints(Workspace& workspace, calib::SfmModel& model) {
     index_of[workspace.images()[i].name] = i;
   }
   std::vector<std::vector<Sample>> samples(model.images.size());
-  ParallelFor(0, static_cast<int>(model.images.size()), workspace.threads(), [&](int i) {
+  ParallelFor(0, static_cast<int>(model.images.size()), [&](int i) {
     workspace.progress().ThrowIfInterrupted();
     const calib::SfmImage& image = model.images[static_cast<size_t>(i)];
     samples[static_cast<size_t>(i)] = SamplesOf(

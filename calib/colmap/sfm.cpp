@@ -69,7 +69,7 @@ bool Map(Workspace& workspace, const fs::path& models, std::uint64_t seed, Mappi
       .Add({"database_path"}, workspace.database().string())
       .Add({"image_path"}, workspace.images_folder().string())
       .Add({"output_path"}, models.string())
-      .Add({"Mapper.num_threads"}, std::to_string(workspace.threads()));
+      .Add({"Mapper.num_threads"}, std::to_string(ThreadLimit::Current()));
   if (mapping == Mapping::kForwardMotion) AllowForwardMotion(arguments);
   if (mapping == Mapping::kFixedIntrinsics) {
     arguments.Add({"Mapper.ba_refine_focal_length"}, "0")
@@ -236,8 +236,8 @@ SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> imag
                     "position to look from",
                     images_dir.string(), images.size()));
   }
-  Workspace workspace(workspace_folder, images_dir, images, "", ResolveThreads(options.threads),
-                      progress, options.engine, options.folder_is_shared);
+  Workspace workspace(workspace_folder, images_dir, images, "", progress, options.engine,
+                      options.folder_is_shared);
   if (options.part && options.part->stage == SfmStage::kPhotos) throw PartDone();
   const auto groups = GroupCameras(workspace.images(), lens, options.share_intrinsics_within_group);
   SfmResult result;
@@ -278,8 +278,8 @@ calib::SfmModel PointsOfMatches(const fs::path& images_dir, std::span<const SfmI
                                 const calib::LensCamera& lens,
                                 const std::map<std::string, Pose>& cam_from_world,
                                 Progress& progress) {
-  Workspace workspace(workspace_folder, images_dir, images, "", ResolveThreads(options.threads),
-                      progress, options.engine, options.folder_is_shared);
+  Workspace workspace(workspace_folder, images_dir, images, "", progress, options.engine,
+                      options.folder_is_shared);
   sfm::ViewGraph graph = ReadViewGraph(workspace.database());
   std::vector<Pose> poses;
   std::vector<bool> posed;
@@ -293,9 +293,8 @@ calib::SfmModel PointsOfMatches(const fs::path& images_dir, std::span<const SfmI
   std::erase_if(graph.pairs, [&](const sfm::PairGeometry& pair) {
     return !posed[static_cast<size_t>(pair.image_a)] || !posed[static_cast<size_t>(pair.image_b)];
   });
-  calib::SfmModel model = sfm::TriangulateMatches(graph, poses, workspace.threads());
-  if (const std::string why = sfm::WhyRigsContradicted(graph, model, workspace.threads());
-      !why.empty()) {
+  calib::SfmModel model = sfm::TriangulateMatches(graph, poses);
+  if (const std::string why = sfm::WhyRigsContradicted(graph, model); !why.empty()) {
     throw Error(fmt::format(
         "structure from motion: expected panoramas that determine their cameras, found that {}; "
         "panoramas must show the same things from several positions",
@@ -311,8 +310,8 @@ std::optional<SfmResult> MapWithFixedIntrinsics(const fs::path& images_dir,
                                                 std::span<const SfmImageInput> images,
                                                 const fs::path& workspace_folder,
                                                 const SfmOptions& options, Progress& progress) {
-  Workspace workspace(workspace_folder, images_dir, images, "", ResolveThreads(options.threads),
-                      progress, options.engine, options.folder_is_shared);
+  Workspace workspace(workspace_folder, images_dir, images, "", progress, options.engine,
+                      options.folder_is_shared);
   const auto groups = GroupCameras(workspace.images(), CameraModelOf(options),
                                    options.share_intrinsics_within_group);
   if (!AllHavePriors(groups)) return {};

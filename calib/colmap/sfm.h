@@ -84,7 +84,6 @@ struct SfmPart {
 struct SfmOptions {
   SfmEngine engine = SfmEngine::kAuto;
   Matching matching = Matching::kAuto;
-  int threads = 0;            ///< 0: all cores
   std::uint64_t seed = 0;     ///< of COLMAP's random choices, as far as it heeds it
   double memory_gb = 4;       ///< COLMAP stays below this many GB (1e9 bytes)
   int max_image_size_px = 0;  ///< long side for features; 0: from the memory

@@ -45,8 +45,8 @@ calib::CameraModel CameraModelOf(const SfmOptions& options) {
 void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& groups,
                         const SfmOptions& options, SfmReport& report,
                         const std::optional<ImagePairs>& allowed, bool known_lenses) {
-  ExtractionPlan plan = PlanExtraction(workspace.images(), workspace.threads(), options.memory_gb,
-                                       options.max_image_size_px);
+  ExtractionPlan plan =
+      PlanExtraction(workspace.images(), options.memory_gb, options.max_image_size_px);
   plan.max_features = options.max_features;
   report.extraction_threads = plan.threads;
   report.max_image_size_px = plan.max_image_size_px;

@@ -181,10 +181,9 @@ std::string Workspace::AliasFor(const std::string& prefix, size_t index, const s
 
 Workspace::Workspace(const fs::path& folder, const fs::path& images_dir,
                      std::span<const SfmImageInput> images, const std::string& alias_prefix,
-                     int threads, Progress& progress, SfmEngine engine, bool is_shared)
+                     Progress& progress, SfmEngine engine, bool is_shared)
     : folder_(fs::absolute(folder)),
       images_(images.begin(), images.end()),
-      threads_(threads),
       progress_(progress),
       engine_(engine) {
   std::sort(images_.begin(), images_.end(),

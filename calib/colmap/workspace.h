@@ -25,7 +25,7 @@ class Workspace {
   /// Throws UsageError on duplicate names or sizes that cannot be, Error on files that are absent
   /// or cannot be linked.
   Workspace(const std::filesystem::path& folder, const std::filesystem::path& images_dir,
-            std::span<const SfmImageInput> images, const std::string& alias_prefix, int threads,
+            std::span<const SfmImageInput> images, const std::string& alias_prefix,
             Progress& progress, SfmEngine engine = SfmEngine::kColmap, bool is_shared = false);
 
   const std::filesystem::path& folder() const { return folder_; }
@@ -39,7 +39,6 @@ class Workspace {
   Progress& progress() { return progress_; }
   /// Of what finds features and matches here: COLMAP's, or kOwnVersion.
   std::string version() const;
-  int threads() const { return threads_; }
 
   /// Name under which COLMAP knows images()[image]. COLMAP's lists separate names by blanks and
   /// trim them, so that photos called "my photo.jpg" could not be paired under their own names.
@@ -86,7 +85,6 @@ class Workspace {
   std::filesystem::path folder_;
   std::vector<SfmImageInput> images_;
   std::vector<std::string> aliases_;
-  int threads_;
   Progress& progress_;
   SfmEngine engine_;
   std::optional<Program> program_;

@@ -67,11 +67,10 @@ std::vector<Eigen::Vector2d> ResidualsOf(const Track& track,
 }  // namespace
 
 ReferenceTracksScore ScoreCameras(const SfmModel& model, std::span<const std::string> photos,
-                                  std::span<const Track> tracks, double loss_scale_px,
-                                  int threads) {
+                                  std::span<const Track> tracks, double loss_scale_px) {
   const std::map<int, PhotoCamera> cameras = CamerasOf(model, photos);
   std::vector<std::vector<Eigen::Vector2d>> residuals(tracks.size());
-  ParallelFor(0, static_cast<int>(tracks.size()), threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(tracks.size()), [&](int i) {
     const auto t = static_cast<size_t>(i);
     residuals[t] = ResidualsOf(tracks[t], cameras);
   });

@@ -28,6 +28,6 @@ struct ReferenceTracksScore {
 /// to place nothing. `photos` are the names that tracks count by. The same result for any number of
 /// threads.
 ReferenceTracksScore ScoreCameras(const SfmModel& model, std::span<const std::string> photos,
-                                  std::span<const Track> tracks, double loss_scale_px, int threads);
+                                  std::span<const Track> tracks, double loss_scale_px);
 
 }  // namespace dtr::calib

@@ -172,7 +172,7 @@ std::vector<Track> Chained(const std::vector<Features>& features,
 }  // namespace
 
 std::vector<Track> FindTracks(int photos, const std::function<ReferenceTracksPhoto(int)>& read,
-                              int threads, Progress& progress) {
+                              Progress& progress) {
   std::vector<Features> features;
   progress.Stage("reference tracks: features", photos);
   for (int i = 0; i < photos; ++i) {
@@ -187,7 +187,7 @@ std::vector<Track> FindTracks(int photos, const std::function<ReferenceTracksPho
   std::vector<Pairs> agreeing(pairs.size());
   progress.Stage("reference tracks: matching", static_cast<int>(pairs.size()));
   std::atomic<int> done = 0;
-  ParallelFor(0, static_cast<int>(pairs.size()), threads, [&](int k) {
+  ParallelFor(0, static_cast<int>(pairs.size()), [&](int k) {
     progress.ThrowIfInterrupted();
     const auto& [a, b] = pairs[static_cast<size_t>(k)];
     agreeing[static_cast<size_t>(k)] =

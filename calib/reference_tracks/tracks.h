@@ -40,7 +40,7 @@ inline constexpr int kMinTrackLength = 4;
 /// looked at shrunk; pixels are always those of the whole photo. The same result for any number of
 /// threads.
 std::vector<Track> FindTracks(int photos, const std::function<ReferenceTracksPhoto(int)>& read,
-                              int threads, Progress& progress);
+                              Progress& progress);
 inline constexpr int kReferenceTracksSidePx = 2400;
 
 }  // namespace dtr::calib

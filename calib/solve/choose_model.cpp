@@ -130,7 +130,7 @@ size_t FoldsOf(std::span<const BoardView> views, const ChoiceOptions& options) {
 std::vector<ModelScore> SolveAll(const Board& board, std::span<const BoardView> views, int width_px,
                                  int height_px, const ChoiceOptions& options, SolveCount& count) {
   std::vector<ModelScore> scores(std::size(kBoardModels));
-  ParallelFor(0, static_cast<int>(scores.size()), options.threads, [&](int m) {
+  ParallelFor(0, static_cast<int>(scores.size()), [&](int m) {
     ModelScore& score = scores[static_cast<size_t>(m)];
     score.model = kBoardModels[m];
     score.coefficients = FreeParameterCount(score.model);
@@ -153,7 +153,7 @@ ErrorsByModel HoldOut(const Board& board, std::span<const BoardView> views,
   const size_t folds = FoldsOf(views, options);
   ErrorsByModel errors(scores.size(), std::vector<ViewError>(views.size()));
   std::vector<std::string> refused(scores.size() * folds);
-  ParallelFor(0, static_cast<int>(refused.size()), options.threads, [&](int task) {
+  ParallelFor(0, static_cast<int>(refused.size()), [&](int task) {
     const auto at = static_cast<size_t>(task);
     const size_t m = at / folds, fold = at % folds;
     if (!scores[m].solution) return count.Done();

@@ -16,7 +16,6 @@ struct ChoiceOptions {
   int resamples = 2000;      ///< of the bootstrap
   double confidence = 0.95;  ///< of its intervals
   std::uint64_t seed = 0;
-  int threads = 0;  ///< 0: all cores; the result is the same for any number
   /// Shows every solve, as a stage of this name, and may interrupt; may be null.
   Progress* progress = nullptr;
   std::string stage = "choosing the camera model";
@@ -39,8 +38,9 @@ struct ModelChoice {
   size_t chosen = 0;
 };
 
-/// A model that bends beyond the corners seen, or is not determined, gives way to another, unless that one's RMS
-/// is this many times larger: then the lens is of its kind, and wants photos nearer to the border.
+/// A model that bends beyond the corners seen, or is not determined, gives way to another, unless
+/// that one's RMS is this many times larger: then the lens is of its kind, and wants photos nearer
+/// to the border.
 inline constexpr double kBendGivesWay = 1.5;
 
 /// True where an RMS is larger than the least one by no more than 10 % or 0.005 px. Photos share

@@ -134,10 +134,10 @@ std::optional<double> OtherModel::DifferenceAt(const Eigen::Vector2d& pixel,
 
 std::vector<OtherModel> OtherModels(const Board& board, BoardModel chosen, int width_px,
                                     int height_px, std::span<const BoardView> views,
-                                    std::span<const std::vector<int>> outliers, int threads) {
+                                    std::span<const std::vector<int>> outliers) {
   const std::vector<BoardView> used = WithoutOutliers(views, outliers);
   std::array<std::optional<BoardSolution>, std::size(kBoardModels)> solved;
-  ParallelFor(0, static_cast<int>(solved.size()), threads, [&](int m) {
+  ParallelFor(0, static_cast<int>(solved.size()), [&](int m) {
     solved[static_cast<size_t>(m)] = SolvedOrNot(board, kBoardModels[m], width_px, height_px, used);
   });
   const BoardSolution* own = nullptr;

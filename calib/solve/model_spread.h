@@ -32,6 +32,6 @@ struct OtherModel {
 /// model itself cannot be solved from these views alone. The same for any number of threads.
 std::vector<OtherModel> OtherModels(const Board& board, BoardModel chosen, int width_px,
                                     int height_px, std::span<const BoardView> views,
-                                    std::span<const std::vector<int>> outliers, int threads = 0);
+                                    std::span<const std::vector<int>> outliers);
 
 }  // namespace dtr::calib

@@ -58,12 +58,12 @@ std::map<size_t, size_t> OrderOfFrames(const std::vector<RigView>& views) {
   return order;
 }
 
-BoardResiduals HeldOut(const ValidatedCalibration& calibration, int threads, std::string* refused) {
+BoardResiduals HeldOut(const ValidatedCalibration& calibration, std::string* refused) {
   const auto order = OrderOfFrames(calibration.kept);
   const size_t folds = std::min(kFolds, order.size());
   std::vector<BoardResiduals> by_fold(folds);
   std::vector<std::string> why(folds);
-  ParallelFor(0, static_cast<int>(folds), threads, [&](int k) {
+  ParallelFor(0, static_cast<int>(folds), [&](int k) {
     const auto fold = static_cast<size_t>(k);
     const auto held = [&](size_t frame) { return order.at(frame) % folds == fold; };
     const Fresh fresh =

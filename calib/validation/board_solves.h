@@ -36,7 +36,7 @@ std::map<size_t, size_t> OrderOfFrames(const std::vector<RigView>& views);
 
 /// Kept views in five folds, each predicted by a solve of the others; `rejected` tells of a fold
 /// whose others could not be solved.
-BoardResiduals HeldOut(const ValidatedCalibration& calibration, int threads, std::string* refused);
+BoardResiduals HeldOut(const ValidatedCalibration& calibration, std::string* refused);
 
 /// Mahalanobis distance of `count` unknowns from `at` on; infinite beyond what a covariance says.
 double Distance(const Eigen::VectorXd& difference, const Eigen::MatrixXd& covariance, int at,

@@ -28,13 +28,9 @@ constexpr double kFar = 1000;     // times the boards' distance: as good as at i
 class BoardValidator {
  public:
   BoardValidator(const ValidatedCalibration& calibration,
-                 const std::optional<TestViews>& test_views, const BoardLimits& limits, int threads,
+                 const std::optional<TestViews>& test_views, const BoardLimits& limits,
                  std::span<const double> distances, Progress* progress)
-      : calibration_(calibration),
-        test_views_(test_views),
-        limits_(limits),
-        threads_(threads),
-        progress_(progress) {
+      : calibration_(calibration), test_views_(test_views), limits_(limits), progress_(progress) {
     if (progress_ != nullptr) progress_->Stage("validating the calibration", kSteps);
     report_.test_views = test_views.has_value();
     for (const RigCamera& camera : calibration.cameras) {
@@ -173,7 +169,7 @@ class BoardValidator {
     BoardResiduals judged = stored_;
     std::string refused;
     if (!test_views_) {
-      judged = HeldOut(calibration_, threads_, &refused);
+      judged = HeldOut(calibration_, &refused);
       for (size_t c = 0; c < report_.cameras.size(); ++c) {
         report_.cameras[c].held_out = Summarise(judged.by_camera[c]);
       }
@@ -263,7 +259,7 @@ class BoardValidator {
       outliers.push_back(view.outliers);
     }
     return OtherModels(calibration_.board, own.model, own.camera.width_px, own.camera.height_px,
-                       views, outliers, threads_);
+                       views, outliers);
   }
 
   // A coefficient of which the corners say little more than is known of any camera.
@@ -301,7 +297,7 @@ class BoardValidator {
     }
     const RigSolution& solution = *Base().solution;
     const ProjectionSensitivity sensitivity(solution);
-    ParallelFor(0, static_cast<int>(report_.cameras.size()), threads_, [&](int c) {
+    ParallelFor(0, static_cast<int>(report_.cameras.size()), [&](int c) {
       const auto at = static_cast<size_t>(c);
       ValidatedCamera& camera = report_.cameras[at];
       const std::vector<OtherModel> others = OtherModelsOf(solution, at);
@@ -354,7 +350,7 @@ class BoardValidator {
     const size_t frames = calibration_.kept.empty() ? TestedFrames() : calibration_.kept_frames;
     const auto order = OrderOfFrames(views);
     std::array<Fresh, 2> halves;
-    ParallelFor(0, 2, threads_, [&](int half) {
+    ParallelFor(0, 2, [&](int half) {
       const auto in_half = [&](size_t f) { return order.at(f) % 2 == static_cast<size_t>(half); };
       halves[static_cast<size_t>(half)] =
           SolveFresh(calibration_, FramesWhere(views, in_half), frames,
@@ -406,7 +402,6 @@ class BoardValidator {
   const ValidatedCalibration& calibration_;
   const std::optional<TestViews>& test_views_;
   const BoardLimits& limits_;
-  int threads_;
   Progress* progress_;
   int steps_done_ = 0;
   BoardValidation report_;
@@ -419,8 +414,8 @@ class BoardValidator {
 
 BoardValidation ValidateBoards(const ValidatedCalibration& calibration,
                                const std::optional<TestViews>& test_views,
-                               const BoardLimits& limits, int threads,
-                               std::span<const double> distances, Progress* progress) {
+                               const BoardLimits& limits, std::span<const double> distances,
+                               Progress* progress) {
   const auto& views = test_views ? test_views->views : calibration.kept;
   for (size_t c = 0; c < calibration.cameras.size(); ++c) {
     if (std::none_of(views.begin(), views.end(), [&](const auto& v) { return v.camera == c; })) {
@@ -429,7 +424,7 @@ BoardValidation ValidateBoards(const ValidatedCalibration& calibration,
                               test_views ? "among the images" : "in the file; give `images`"));
     }
   }
-  return BoardValidator(calibration, test_views, limits, threads, distances, progress).Run();
+  return BoardValidator(calibration, test_views, limits, distances, progress).Run();
 }
 
 }  // namespace dtr::calib

@@ -29,7 +29,7 @@ struct BoardLimits {
   double max_uncertainty_px = 0.5;  ///< at the boards' distance, in 95 % of the image
   double max_far_uncertainty_px = 1;
   double max_term_share = kMaxTermShare;  ///< of a coefficient, worst camera: term_uncertainty.h
-  double min_views = 8;       ///< per camera: two halves that can be solved
+  double min_views = 8;                   ///< per camera: two halves that can be solved
   double min_coverage = 0.5;  ///< share of 12 x 8 image regions with a corner, worst camera
   double min_tilt_deg = 15;   ///< largest angle between two boards, worst camera
   double min_p = 1e-4;        ///< less likely by chance than this is no chance
@@ -104,8 +104,7 @@ struct BoardValidation {
 /// or unseen views of every camera; throws Error without.
 BoardValidation ValidateBoards(const ValidatedCalibration& calibration,
                                const std::optional<TestViews>& test_views,
-                               const BoardLimits& limits, int threads = 0,
-                               std::span<const double> distances = {},
+                               const BoardLimits& limits, std::span<const double> distances = {},
                                Progress* progress = nullptr);
 
 /// JSON object: passed, result and conclusion (conclusion.h), tests[] as `validate` of sets has

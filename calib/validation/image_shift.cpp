@@ -68,7 +68,7 @@ double ImageShift(const std::vector<PlacedPixel>& placed) {
 
 }  // namespace
 
-void ImageShifts(const Adjusted& fresh, const BundleCovariance& covariance, int threads,
+void ImageShifts(const Adjusted& fresh, const BundleCovariance& covariance,
                  std::vector<PhotoValidation>& cameras) {
   const auto observations = ObservationsByImage(fresh);
   std::vector<std::vector<int>> seen_by(fresh.bundle.points.size());
@@ -79,7 +79,7 @@ void ImageShifts(const Adjusted& fresh, const BundleCovariance& covariance, int 
       seen_by[point].push_back(static_cast<int>(i));
     }
   }
-  ParallelFor(0, static_cast<int>(observations.size()), threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(observations.size()), [&](int i) {
     PhotoValidation& camera = cameras[static_cast<size_t>(i)];
     camera.placed = Placed(fresh, covariance, observations, seen_by, i);
     camera.image_shift_px = ImageShift(camera.placed);

@@ -8,7 +8,7 @@
 namespace dtr::calib {
 
 /// Fills in `placed` and `image_shift_px` of every image's validation result (TransferCovariance).
-void ImageShifts(const Adjusted& fresh, const BundleCovariance& covariance, int threads,
+void ImageShifts(const Adjusted& fresh, const BundleCovariance& covariance,
                  std::vector<PhotoValidation>& cameras);
 
 }  // namespace dtr::calib

@@ -59,11 +59,10 @@ std::vector<Degeneracy> OpenIntrinsics(const Adjusted& fresh, const BundleCovari
   return open;
 }
 
-FreshSolves SolveWith(const Bundle& stored, const Halves& halves, const AdjustOptions& options,
-                      int threads) {
+FreshSolves SolveWith(const Bundle& stored, const Halves& halves, const AdjustOptions& options) {
   FreshSolves fresh;
   fresh.options = options;
-  ParallelFor(0, halves.parts.empty() ? 1 : 3, threads, [&](int i) {
+  ParallelFor(0, halves.parts.empty() ? 1 : 3, [&](int i) {
     fresh.solved[i] = Adjust(i == 0 ? stored : halves.parts[static_cast<size_t>(i) - 1], options);
   });
   fresh.covariance = CovarianceOf(fresh.solved[0], options);
@@ -89,11 +88,10 @@ Halves HalvesOf(const Bundle& stored) {
   return halves;
 }
 
-FreshSolves SolveAfresh(const Bundle& stored, const Halves& halves, int threads,
-                        const Progress* progress) {
+FreshSolves SolveAfresh(const Bundle& stored, const Halves& halves, const Progress* progress) {
   AdjustOptions options = AllFree();
   options.progress = progress;
-  FreshSolves free = SolveWith(stored, halves, options, threads);
+  FreshSolves free = SolveWith(stored, halves, options);
   if (!free.covariance.computed) return free;
   const bool usable = free.covariance.determined && free.solved[0].converged;
   if (usable) {
@@ -109,7 +107,7 @@ FreshSolves SolveAfresh(const Bundle& stored, const Halves& halves, int threads,
   };
   if (holds("open_principal_point")) options.lens = LensFreedom::kNoPrincipalPoint;
   if (holds("open_aspect_ratio")) options.aspect_sigma = kHeldAspectSigma;
-  FreshSolves held = SolveWith(stored, halves, options, threads);
+  FreshSolves held = SolveWith(stored, halves, options);
   held.open = std::move(free.open);
   held.open_centres = std::move(free.open_centres);
   if (!usable && held.covariance.determined && held.solved[0].converged) {

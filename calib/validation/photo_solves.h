@@ -41,7 +41,6 @@ struct FreshSolves {
 /// there is noise itself. So principal points and ratios of focal lengths that are little better
 /// known than of any camera (kKnownPrincipalPointShare, kKnownAspectSigma) are held in a second
 /// solve. Throws as Adjust does.
-FreshSolves SolveAfresh(const Bundle& stored, const Halves& halves, int threads,
-                        const Progress* progress);
+FreshSolves SolveAfresh(const Bundle& stored, const Halves& halves, const Progress* progress);
 
 }  // namespace dtr::calib

@@ -336,7 +336,7 @@ void AddNotValidated(const Bundle& given, PhotosValidation& all) {
                                           all.not_validated});
 }
 
-PhotosValidation ValidatePart(const Bundle& given, const BundleLimits& limits, int threads,
+PhotosValidation ValidatePart(const Bundle& given, const BundleLimits& limits,
                               const Progress* progress) {
   PhotosValidation validation;
   std::vector<bool> seen(given.points.size());
@@ -357,7 +357,7 @@ PhotosValidation ValidatePart(const Bundle& given, const BundleLimits& limits, i
   const Halves halves = HalvesOf(stored);
   FreshSolves solves;
   try {
-    solves = SolveAfresh(stored, halves, threads, progress);
+    solves = SolveAfresh(stored, halves, progress);
   } catch (const Interrupted&) {
     throw;
   } catch (const Error& error) {
@@ -386,7 +386,7 @@ PhotosValidation ValidatePart(const Bundle& given, const BundleLimits& limits, i
         validation, fmt::format("the fresh solve did not settle in {} steps", fresh.iterations));
   }
   CompareWithStored(stored, fresh, covariance, validation);
-  ImageShifts(fresh, covariance, threads, validation.cameras);
+  ImageShifts(fresh, covariance, validation.cameras);
   AddHalves(limits, halves, solves, validation);
   WidenByHalves(validation);
   AddDifferences(limits, validation);
@@ -447,7 +447,7 @@ double NegligiblePx(const BundleLimits& limits, double sigma_px) {
                     limits.max_negligible_px);
 }
 
-PhotosValidation ValidatePhotos(const Bundle& given, const BundleLimits& limits, int threads,
+PhotosValidation ValidatePhotos(const Bundle& given, const BundleLimits& limits,
                                 const Progress* progress) {
   // With distortion, as it is solved for.
   // Photos of fewer observations are those of the test cameras_untested.
@@ -459,11 +459,11 @@ PhotosValidation ValidatePhotos(const Bundle& given, const BundleLimits& limits,
   }
   PhotosValidation all;
   if (ValidationUnknowns(WithDistortion(seen)) <= limits.max_unknowns) {
-    all = ValidatePart(seen, limits, threads, progress);
+    all = ValidatePart(seen, limits, progress);
   } else {
     // Half of what one part may have: work grows with the cube.
     const std::vector<Bundle> parts = PartsOf(seen, limits.max_unknowns / 2);
-    for (const Bundle& part : parts) Join(ValidatePart(part, limits, threads, progress), all);
+    for (const Bundle& part : parts) Join(ValidatePart(part, limits, progress), all);
     all.parts = static_cast<int>(parts.size());
   }
   AddNotValidated(seen, all);

@@ -90,7 +90,7 @@ struct PhotosValidation {
 /// 100 that see the same points, each by itself; of every test the worst part's figure is reported.
 /// Deterministic for any number of threads. Throws Error on a broken bundle only, and Interrupted
 /// where `progress` asks for it.
-PhotosValidation ValidatePhotos(const Bundle& stored, const BundleLimits& limits, int threads = 0,
+PhotosValidation ValidatePhotos(const Bundle& stored, const BundleLimits& limits,
                                 const Progress* progress = nullptr);
 
 /// JSON object: parts, sigma_px, condition, halves_ratio, observations, lenses[], cameras[],

@@ -270,7 +270,7 @@ void ThinOut(std::vector<ResidualArrow>& arrows) {
 ValidationReport ValidateReprojection(std::span<const PinholeCamera> cameras,
                                       std::span<const Pose> cam_from_world,
                                       const SparseScene& scene, const ValidateLimits& limits,
-                                      std::span<const std::string> names, int threads,
+                                      std::span<const std::string> names,
                                       const std::vector<bool>& held_out) {
   CheckInput(cameras, cam_from_world, scene, names, held_out);
   const std::vector<std::vector<int>> tracks = Tracks(scene);
@@ -278,7 +278,7 @@ ValidationReport ValidateReprojection(std::span<const PinholeCamera> cameras,
 
   constexpr int kBlock = 64;  // points per work item, so that handing out costs nothing
   const int points = static_cast<int>(tracks.size());
-  ParallelFor(0, (points + kBlock - 1) / kBlock, threads, [&](int block) {
+  ParallelFor(0, (points + kBlock - 1) / kBlock, [&](int block) {
     for (int p = block * kBlock; p < std::min(points, (block + 1) * kBlock); ++p) {
       std::vector<Observation> observations;
       std::vector<ObservationTest*> track_tests;

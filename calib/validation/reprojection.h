@@ -80,7 +80,7 @@ struct ValidationReport {
 ValidationReport ValidateReprojection(std::span<const PinholeCamera> cameras,
                                       std::span<const Pose> cam_from_world,
                                       const SparseScene& scene, const ValidateLimits& limits,
-                                      std::span<const std::string> names, int threads = 0,
+                                      std::span<const std::string> names,
                                       const std::vector<bool>& held_out = {});
 
 /// JSON object: passed, tests[].{name,value,limit,passed,reason},

@@ -190,7 +190,7 @@ Choice ChooseFrames(const Videos& files, const VideoOptions& options, Capture& r
 
 // Writes the chosen frames and notes under its name what each is.
 void WriteFrames(const Videos& files, const std::vector<fs::path>& folders,
-                 const std::vector<ChosenFrame>& frames, const fs::path& top, int threads,
+                 const std::vector<ChosenFrame>& frames, const fs::path& top,
                  std::map<std::string, VideoFrame>& origins, Progress& progress) {
   progress.Stage("writing frames", static_cast<int>(frames.size()));
   for (const fs::path& folder : folders) fs::create_directories(top / folder);
@@ -204,7 +204,7 @@ void WriteFrames(const Videos& files, const std::vector<fs::path>& folders,
     if (videos.number() != frames[next].number) continue;
     progress.ThrowIfInterrupted();
     const std::vector<ImageRgb8> pictures = ImagesOf(videos);
-    ParallelFor(0, static_cast<int>(pictures.size()), threads, [&](int i) {
+    ParallelFor(0, static_cast<int>(pictures.size()), [&](int i) {
       const fs::path name =
           folders[static_cast<size_t>(i)] / fmt::format("frame_{:06}.jpg", frames[next].number);
       io::WriteImage(top / name, pictures[static_cast<size_t>(i)], kJpegQuality);
@@ -287,12 +287,10 @@ Capture IngestVideos(const Videos& videos, const VideoOptions& options, const fs
     std::vector<fs::path> folders;
     for (const fs::path& video : group) folders.push_back(FolderFor(video, videos));
     const Choice choice = ChooseFrames(group, options, reported, progress);
-    WriteFrames(group, folders, choice.frames, folder, options.threads, origins, progress);
+    WriteFrames(group, folders, choice.frames, folder, origins, progress);
   }
   // Frames are photos, whatever a video is called: "normal.mp4" is one speed of several.
-  Capture capture = IngestPhotos(
-      folder, {.sort = false, .threads = options.threads, .memory_gb = options.memory_gb},
-      progress);
+  Capture capture = IngestPhotos(folder, {.sort = false, .memory_gb = options.memory_gb}, progress);
   std::map<std::string, std::string> projections;
   for (const fs::path& video : videos) {
     projections[video.filename().string()] = VideoReader(video).Projection();

@@ -18,7 +18,6 @@ struct VideoOptions {
   /// The videos began at the same moment and run at the same rate, as a rig's do: the same frames
   /// are taken of each. Else each video is looked at for itself.
   bool synchronised = false;
-  int threads = 0;       ///< 0: all cores
   double memory_gb = 0;  ///< as IngestOptions::memory_gb, of the frames that were taken
 };
 

@@ -83,12 +83,11 @@ void Say(const advise::Advice& advice, const advise::AdviseOptions& options, Con
 
 int Run(AdviseArguments options, const Context& context) {
   if (!options.output.empty()) RequireOutputFile(options.output, "-o", {".html", ".htm"});
-  options.advise.threads = context.common.threads;
   DtrSet set = io::ReadSet(options.set);
   RequireOneFrame(set);
   io::CollapseDuplicates(set);
-  const auto views = pipeline::CoarseViewsOf(
-      options.set, set, {context.common.threads, pipeline::kDefaultMemoryGb}, context.console);
+  const auto views =
+      pipeline::CoarseViewsOf(options.set, set, pipeline::kDefaultMemoryGb, context.console);
   if (views.size() < 2) {
     throw Error(
         fmt::format("{}: expected at least 2 source views with depth, found {}; run dtr stereo "

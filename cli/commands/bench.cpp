@@ -89,7 +89,6 @@ int RunGrowthTable(const BenchArguments& options, RenderOptions render, const Dt
 DtrSet LoadWhole(const BenchArguments& options, const Context& context) {
   io::LoadOptions load;
   load.held_out = load.completed = true;
-  load.threads = context.common.threads;
   load.warn = [&context](const std::string& line) { context.console.Note(line); };
   return io::LoadSet(options.set, load);
 }
@@ -110,9 +109,8 @@ int RunOsgTable(const BenchArguments& options, const RenderOptions& render,
   std::vector<NovelCamera> path = FlyThrough(set, options.repeats);
   for (NovelCamera& novel : path) novel.camera = pipeline::WithSize(novel.camera, options.size);
   const OsgBench bench = MeasureOnOsg(std::move(set), path, variants, context.console);
-  const eval::BenchMachine machine{
-      CpuModel(), static_cast<int>(std::thread::hardware_concurrency()), bench.renderer,
-      DTR_VERSION, bench.drawn_by_processor ? "processor" : "wall"};
+  const eval::BenchMachine machine{CpuModel(), Cores(), bench.renderer, DTR_VERSION,
+                                   bench.drawn_by_processor ? "processor" : "wall"};
   SayOsgTable(bench, machine, context.console);
   context.EmitJson(OsgJson(bench, machine));
   return kDone;
@@ -127,7 +125,6 @@ int RunOsgTable(const BenchArguments&, const RenderOptions&, const Context&) {
 
 int RunBench(const BenchArguments& options, const Context& context) {
   RenderOptions render = *options.render;
-  render.threads = context.common.threads;
   if (options.table.empty()) {
     SweepRequest request = options.sweep;
     request.set = options.set;

@@ -96,7 +96,6 @@ class RenderStage final : public Measurable {
   static DtrSet Load(const fs::path& folder, const Context& context) {
     io::LoadOptions load;
     load.held_out = load.completed = true;
-    load.threads = context.common.threads;
     load.warn = [&context](const std::string& line) { context.console.Note(line); };
     return io::LoadSet(folder, load);
   }
@@ -115,7 +114,7 @@ class CalibrationStage final : public Measurable {
   CalibrationStage(const SweepRequest& request, const Context& context, const fs::path& work)
       : request_(request),
         sweep_({request.set, request.photos, work / "calibrations", request.feature_sizes_px,
-                context.common.threads, context.common.seed},
+                context.common.seed},
                context.console) {}
   eval::SweepStage Stage() const override { return sweep_.Stage(); }
   std::string Conditions() const override { return sweep_.Conditions(); }
@@ -176,12 +175,11 @@ std::unique_ptr<Measurable> MakeStage(const std::string& name, const SweepReques
   };
   if (name == "stereo") {
     pipeline::StereoSweepOptions options{
-        request.set,          work,          request.truth,          request.max_sizes_px,
-        request.bench.render, make_renderer, context.common.threads, context.common.seed};
+        request.set,          work,          request.truth,      request.max_sizes_px,
+        request.bench.render, make_renderer, context.common.seed};
     return std::make_unique<SetStage<pipeline::StereoSweep>>(request, options, context.console);
   }
-  pipeline::StorageSweepOptions options{request.set, work, request.bench.render, make_renderer,
-                                        context.common.threads};
+  pipeline::StorageSweepOptions options{request.set, work, request.bench.render, make_renderer};
   return std::make_unique<SetStage<pipeline::StorageSweep>>(request, options, context.console);
 }
 
@@ -325,8 +323,8 @@ void Check(const SweepRequest& request) {
 }  // namespace
 
 eval::BenchMachine MachineOf(const eval::TimedRenderer& renderer) {
-  return {CpuModel(), static_cast<int>(std::thread::hardware_concurrency()), renderer.Description(),
-          DTR_VERSION, renderer.HasGpuClock() ? "gpu timer" : "wall"};
+  return {CpuModel(), Cores(), renderer.Description(), DTR_VERSION,
+          renderer.HasGpuClock() ? "gpu timer" : "wall"};
 }
 
 void AddSweepOptions(CLI::App& command, CLI::Option* table, SweepRequest& request) {

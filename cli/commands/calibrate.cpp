@@ -39,9 +39,8 @@ int RunCalibratePhotos(const CalibrateArguments& options, const Context& context
   // Before any photo is read: what is missing or wrong must not cost their time.
   if (!options.lens.empty()) calibrate.lens = pipeline::ReadLens(options.lens);
   pipeline::RequireCalibration({}, "", options.sfm);
-  auto photos = capture::IngestPhotos(
-      options.photos, {.threads = context.common.threads, .memory_gb = options.memory_gb},
-      context.console);
+  auto photos =
+      capture::IngestPhotos(options.photos, {.memory_gb = options.memory_gb}, context.console);
   for (const capture::Skipped& photo : photos.skipped) {
     context.console.Note(fmt::format("skipped: {}: {}", photo.name, photo.reason));
   }
@@ -54,7 +53,6 @@ int RunCalibratePhotos(const CalibrateArguments& options, const Context& context
   capture::RequireEnoughPhotos(photos, options.photos);
   pipeline::RequireMetres(metres, photos, options.photos.string());
   calibrate.metres = metres;
-  calibrate.threads = context.common.threads;
   calibrate.seed = context.common.seed;
   calibrate.memory_gb = options.memory_gb;
   calibrate.sfm = options.sfm;

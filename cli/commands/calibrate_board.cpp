@@ -101,12 +101,11 @@ int RunCalibrateBoard(const CalibrateBoardArguments& options, const Context& con
   calibrate.model = ModelFrom(options.model);
   calibrate.solve.loss =
       options.loss == "quadratic" ? calib::Loss::kQuadratic : calib::Loss::kRobust;
-  calibrate.threads = context.common.threads;
   calibrate.seed = context.common.seed;
   calib::DetectOptions detect;
   detect.detector = DetectorFrom(options.detector);
-  const auto photos = pipeline::ReadBoardPhotos(options.photos, options.images, board, detect,
-                                                context.common.threads, context.console);
+  const auto photos =
+      pipeline::ReadBoardPhotos(options.photos, options.images, board, detect, context.console);
   const auto calibration = pipeline::CalibrateBoard(
       board, photos, options.outputs.front().stem().string(), calibrate, context.console);
   for (const fs::path& output : options.outputs) pipeline::WriteCameraFile(output, calibration);

@@ -76,7 +76,6 @@ int RunRefine(const CalibrateRefineArguments& options, const Context& context) {
   refine.separate_lenses = options.separate;
   refine.covariance = options.covariance;
   refine.determined = options.model.string();
-  refine.threads = context.common.threads;
   refine.seed = context.common.seed;
   refine.progress = &context.console;
   context.console.Stage("bundle adjustment", 0);

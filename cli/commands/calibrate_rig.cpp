@@ -119,7 +119,6 @@ int RunCalibrateRig(const CalibrateRigArguments& options, const Context& context
       options.loss == "quadratic" ? calib::Loss::kQuadratic : calib::Loss::kRobust;
   calibrate.fixed_lenses = options.lenses == "fixed";
   calibrate.free_running = options.clocks == "free";
-  calibrate.threads = context.common.threads;
   calibrate.seed = context.common.seed;
   std::map<std::string, calib::LensCamera> known;
   for (const std::string& given : options.given) {
@@ -132,8 +131,7 @@ int RunCalibrateRig(const CalibrateRigArguments& options, const Context& context
     calibrate.given[name] = pipeline::GivenLens(pipeline::ReadLens(file), file);
     known.insert_or_assign(name, *calibrate.given[name].given);
   }
-  const auto photos = pipeline::ReadRigPhotos(options.folder, board, {}, context.common.threads,
-                                              context.console, known);
+  const auto photos = pipeline::ReadRigPhotos(options.folder, board, {}, context.console, known);
   pipeline::RigSummary summary;
   const auto calibration =
       pipeline::CalibrateRig(board, photos, calibrate, &summary, context.console);

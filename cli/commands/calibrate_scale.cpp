@@ -51,7 +51,6 @@ int RunScale(CalibrateScaleArguments options, const Context& context) {
     NameViews(set, distance.b);
     options.scale.distances.push_back(std::move(distance));
   }
-  options.scale.threads = context.common.threads;
   const auto report = pipeline::ScaleSet(options.scale, context.console);
   for (const std::string& line : report.lines) context.console.Say(line);
   context.console.Say(fmt::format("{}: one unit was {:.6g} m +- {:.2g} %; the set is in metres now",

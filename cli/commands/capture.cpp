@@ -103,11 +103,10 @@ void Say(const capture::Capture& capture, const fs::path& output, Console& conso
 
 int Run(const CaptureArguments& options, const Context& context) {
   const std::vector<capture::Fault> drop = FaultsIn(options.drop);
-  const capture::StoreOptions store{options.force, context.common.threads, options.video.memory_gb};
+  const capture::StoreOptions store{options.force, options.video.memory_gb};
   const fs::path output = WithoutTrailingSlash(options.output);
   capture::CaptureWriter writer(output, store);
   capture::VideoOptions video = options.video;
-  video.threads = context.common.threads;
   capture::Capture ingested = pipeline::Ingest(
       options.source, video, options.panoramas,
       [&] { return writer.Open() / capture::kFramesFolder; }, context.console);
@@ -119,7 +118,7 @@ int Run(const CaptureArguments& options, const Context& context) {
         options.source.string()));
   }
   const auto look = pipeline::LookAt(ingested, "Photos of " + options.source.filename().string(),
-                                     context.common.threads, store.memory_gb, context.console);
+                                     store.memory_gb, context.console);
   const fs::path unfinished = writer.Open();
   io::WriteImage(unfinished / capture::kContactSheetFile, look.contact_sheet);
   WriteFileAtomically(unfinished / capture::kPageFile, look.page);

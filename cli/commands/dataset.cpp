@@ -115,7 +115,7 @@ void AddMake(CLI::App& dataset) {
           if (!options->offset.empty()) {
             spec.world_offset = {options->offset[0], options->offset[1], options->offset[2]};
           }
-          datasets::MakeDataset(spec, options->output, context.common.threads, context.console);
+          datasets::MakeDataset(spec, options->output, context.console);
           context.console.Say(spec.steps == 1
                                   ? fmt::format("{}: {} photos of {}", options->output.string(),
                                                 spec.views, spec.scene)
@@ -142,8 +142,7 @@ void AddGet(CLI::App& dataset) {
             ->required()
             ->type_name("DIR");
         return [options](const Context& context) -> int {
-          const auto check =
-              datasets::CheckPublicSet(options->name, options->folder, context.common.threads);
+          const auto check = datasets::CheckPublicSet(options->name, options->folder);
           context.console.Say(fmt::format("{}: {} files as known, {} missing, {} changed",
                                           check.name, check.files_ok, check.missing.size(),
                                           check.changed.size()));

@@ -109,7 +109,6 @@ std::string JsonOverTime(const pipeline::EvaluateResult& result) {
 int RunEvaluate(const EvaluateArguments& options, const Context& context) {
   pipeline::EvaluateRequest request = options.request;
   request.render = *options.render;
-  request.threads = context.common.threads;
   request.force = context.common.force;
   const auto result = pipeline::Evaluate(
       request, [&] { return MakeRenderer(options.renderer, context.console); }, context.console);

@@ -132,7 +132,6 @@ int RunFormat(Request request, const Format& format, const Context& context) {
     RequireOutputFile(request.output, "-o", format.extensions);
   }
   if (!std::filesystem::exists(request.output)) RequireFolderOf(request.output, "-o");
-  request.threads = context.common.threads;
   request.force = context.common.force;
   const pipeline::ExportReport report = format.write(request, context.console);
   context.console.Say(Summary(request, format, report));
@@ -182,7 +181,6 @@ int RunExport(ExportOptions options, const Context& context) {
   if (options.format == "web") {
     options.web.set = options.request.set;
     options.web.output = options.request.output;
-    options.web.threads = context.common.threads;
     if (options.evaluates_web) {
       options.web.render = StoredRenderOptions(io::ReadSet(options.web.set), WholeFrames());
       options.web.make_renderer = [&context] { return MakeRenderer({}, context.console); };

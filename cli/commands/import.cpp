@@ -37,7 +37,6 @@ int RunImport(pipeline::ImportRequest request, const std::string& depth_kind,
               const Context& context) {
   if (depth_kind == "z") request.depth_kind = DepthKind::kPlaneZ;
   if (depth_kind == "ray") request.depth_kind = DepthKind::kRayDistance;
-  request.threads = context.common.threads;
   request.seed = context.common.seed;
   const pipeline::ImportReport report = pipeline::Import(request, context.console);
   context.console.Say(fmt::format("{}: {} views, {} held out", request.output.string(),

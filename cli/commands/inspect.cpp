@@ -84,7 +84,7 @@ std::optional<SweepFacts> BenchOf(const InspectArguments& options) {
   return ReadSweep(ReadFile(file, kFileLimitBytes), file.string());
 }
 
-viewer::InspectFacts FactsOf(const InspectArguments& options, const DtrSet& set, int threads) {
+viewer::InspectFacts FactsOf(const InspectArguments& options, const DtrSet& set) {
   viewer::InspectFacts facts;
   facts.name = WithoutTrailingSlash(options.set).filename().string();
   facts.checks = ChecksOf(set);
@@ -92,18 +92,16 @@ viewer::InspectFacts FactsOf(const InspectArguments& options, const DtrSet& set,
   const calib::ValidateLimits limits;
   facts.error_limit_px = limits.max_camera_rms_px;
   if (set.sparse_file) {
-    const auto report =
-        pipeline::ReprojectionOfSet(set, io::LoadSparse(options.set, set), limits, threads);
+    const auto report = pipeline::ReprojectionOfSet(set, io::LoadSparse(options.set, set), limits);
     for (const auto& camera : report.cameras) {
       if (camera.held_out.count < limits.min_observations) continue;
       facts.error_px[camera.name] = camera.held_out.rms_px;
     }
   }
-  facts.load = [folder = options.set, threads](const View& view) {
+  facts.load = [folder = options.set](const View& view) {
     View loaded = view;
     io::LoadOptions load;
     load.sigma = true;
-    load.threads = threads;
     io::LoadPixels(folder, loaded, load);
     return loaded;
   };
@@ -112,11 +110,10 @@ viewer::InspectFacts FactsOf(const InspectArguments& options, const DtrSet& set,
 
 int RunInspect(const InspectArguments& options, const Context& context) {
   RequireOutputFile(options.output, "-o", {".html", ".htm"});
-  const int threads = context.common.threads;
   DtrSet set = io::ReadSet(options.set);
   RequireOneFrame(set);
   const std::optional<SweepFacts> bench = BenchOf(options);
-  viewer::InspectFacts facts = FactsOf(options, set, threads);
+  viewer::InspectFacts facts = FactsOf(options, set);
   if (bench) {
     facts.add_further = [&bench](report::HtmlReport& page) {
       page.Section("What settings cost and are worth");
@@ -126,9 +123,8 @@ int RunInspect(const InspectArguments& options, const Context& context) {
   }
   io::CollapseDuplicates(set);
   const auto stream = pipeline::StreamOf(options.set, set, {DescribeRenderScene(set)},
-                                         {options.memory_gb, threads}, context.console);
+                                         {options.memory_gb}, context.console);
   RenderOptions render = StoredRenderOptions(set);
-  render.threads = threads;
   WriteFileAtomically(options.output,
                       viewer::InspectPage(set, *stream, facts, render, context.console));
   context.console.Say(options.output.string());

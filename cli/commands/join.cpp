@@ -39,7 +39,6 @@ void AddJoinCommand(CLI::App& app) {
         return [options](const Context& context) -> int {
           context.console.KeepsWork();
           pipeline::JoinOptions join = options->join;
-          join.threads = context.common.threads;
           if (!options->video.empty()) join.video = io::VideoQualityFrom(options->video);
           const size_t frames =
               pipeline::JoinSets(options->sets, options->output, join, context.console);

@@ -58,7 +58,6 @@ void SayResult(const PruneArguments& options, const pipeline::PruneSetReport& re
 
 int RunPrune(PruneArguments& options, const Context& context) {
   context.console.KeepsWork();
-  options.prune.threads = context.common.threads;
   options.prune.prune.seed = context.common.seed;
   options.prune.prune.render = *options.render;
   options.prune.renderer = options.renderer.name;

@@ -52,7 +52,6 @@ std::string ToJson(const pipeline::RenderReport& report) {
 int RunRender(const RenderArguments& options, const Context& context) {
   pipeline::RenderRequest request = options.request;
   request.render = *options.render;
-  request.threads = context.common.threads;
   request.force = context.common.force;
   const pipeline::RenderReport report = pipeline::Render(
       request,

@@ -48,8 +48,7 @@ int RunSelftest(const SelftestArguments& options, const Context& context) {
     throw UsageError("-o: expected --stability with it: the table holds every case");
   }
   const std::vector<selftest::Row> rows =
-      selftest::RunCases(selftest::AllCases(Renderers(console)),
-                         {.threads = context.common.threads}, !options.stability, console);
+      selftest::RunCases(selftest::AllCases(Renderers(console)), !options.stability, console);
   console.ThrowIfInterrupted();
   for (const selftest::Row& row : rows) {
     for (const std::string& line : selftest::TextLines(row)) console.Say(line);

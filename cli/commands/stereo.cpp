@@ -30,7 +30,6 @@ void AddStereoCommand(CLI::App& app) {
         command.add_flag("--force", options->force, "Replace SET2 when it exists");
         return [options](const Context& context) -> int {
           context.console.KeepsWork();
-          options->threads = context.common.threads;
           options->seed = context.common.seed;
           const auto report = pipeline::RecomputeDepth(*options, context.console);
           context.console.Say(fmt::format("{}: {} depth maps, {:.1f} % of the pixels have depth",

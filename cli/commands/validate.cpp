@@ -73,8 +73,8 @@ int RunValidate(ValidateArguments options, const Context& context) {
   const DtrSet set = io::ReadSet(options.set);
   RequireOneFrame(set);
   const SparseScene sparse = io::LoadSparse(options.set, set);
-  const auto report = pipeline::ValidateSet(options.set, set, sparse, options.limits,
-                                            context.common.threads, context.console);
+  const auto report =
+      pipeline::ValidateSet(options.set, set, sparse, options.limits, context.console);
   SayReport(report, context.console);
   if (page) {
     const std::string name = options.set.lexically_normal().filename().string();

@@ -110,18 +110,16 @@ int RunValidateCalibration(const ValidateCalibrationOptions& options, const Cont
   std::optional<calib::TestViews> test_views;
   auto skipped = nlohmann::ordered_json::array();
   if (options.images) {
-    pipeline::TestPhotos photos =
-        pipeline::ReadTestPhotos(calibration, *options.images, options.pattern.value_or("*"),
-                                 context.common.threads, context.console);
+    pipeline::TestPhotos photos = pipeline::ReadTestPhotos(
+        calibration, *options.images, options.pattern.value_or("*"), context.console);
     for (const calib::LeftOut& photo : photos.left_out) {
       context.console.Say(fmt::format("left out: {}: {}", photo.name, photo.reason));
       skipped.push_back({{"name", photo.name}, {"reason", photo.reason}});
     }
     test_views = std::move(photos.test_views);
   }
-  const calib::BoardValidation report =
-      calib::ValidateBoards(pipeline::ToValidate(calibration), test_views, limits,
-                            context.common.threads, distances, &context.console);
+  const calib::BoardValidation report = calib::ValidateBoards(
+      pipeline::ToValidate(calibration), test_views, limits, distances, &context.console);
   SayReport(report, context.console);
   SayUncertainty(report, calibration.board.metric, context.console);
   if (options.report) {
@@ -140,8 +138,8 @@ int RunValidateCalibration(const ValidateCalibrationOptions& options, const Cont
 
 int ValidateMade(const calib::Calibration& calibration, const Context& context,
                  nlohmann::ordered_json& json) {
-  const calib::BoardValidation report = calib::ValidateBoards(
-      pipeline::ToValidate(calibration), {}, {}, context.common.threads, {}, &context.console);
+  const calib::BoardValidation report =
+      calib::ValidateBoards(pipeline::ToValidate(calibration), {}, {}, {}, &context.console);
   for (const Check& test : report.tests) {
     if (!test.passed) context.console.Say(calib::LineOf(test));
   }

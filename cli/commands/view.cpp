@@ -54,9 +54,8 @@ std::unique_ptr<viewer::OpenedSet> Open(const Options& options, const Context& c
   opened->set = io::ReadSet(options.set);
   opened->defaults = StoredRenderOptions(opened->set, WholeFrames());
   io::CollapseDuplicates(opened->set);
-  opened->stream = pipeline::StreamOf(
-      options.set, opened->set, DescribeFrames(opened->set, {}),
-      {options.memory_gb, context.common.threads, options.measured_only}, context.console);
+  opened->stream = pipeline::StreamOf(options.set, opened->set, DescribeFrames(opened->set, {}),
+                                      {options.memory_gb, options.measured_only}, context.console);
   return opened;
 }
 
@@ -198,8 +197,7 @@ std::map<std::string, viewer::ViewValidation> ValidateViews(const Options& optio
   std::map<std::string, viewer::ViewValidation> validations;
   if (!set.sparse_file) return validations;  // nothing to validate by
   const calib::ValidateLimits limits;
-  const auto report = pipeline::ReprojectionOfSet(set, io::LoadSparse(options.set, set), limits,
-                                                  context.common.threads);
+  const auto report = pipeline::ReprojectionOfSet(set, io::LoadSparse(options.set, set), limits);
   for (const auto& camera : report.cameras) {
     if (camera.held_out.count < limits.min_observations) continue;
     validations[camera.name] = {camera.held_out.rms_px <= limits.max_camera_rms_px,
@@ -295,7 +293,6 @@ viewer::AppSettings SettingsOf(const Options& options, const Context& context, c
   settings.width_px = size.width_px();
   settings.height_px = size.height_px();
   settings.render = *options.render;
-  settings.render.threads = context.common.threads;
   settings.gpu_bytes = static_cast<size_t>(options.renderer.gpu_memory_gb * kBytesPerGigabyte);
   settings.shader_folder = options.renderer.shader_folder.string();
   settings.drawer = DrawerOf(options.renderer.name);

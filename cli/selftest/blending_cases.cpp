@@ -60,7 +60,7 @@ BlendParameters Of(BlendWeight blend) {
   return p;
 }
 
-Outcome CosinePowers(const Conditions&) {
+Outcome CosinePowers() {
   Outcome outcome;
   Shares shares;
   Random random(1);
@@ -75,7 +75,7 @@ Outcome CosinePowers(const Conditions&) {
   return outcome;
 }
 
-Outcome Exponentials(const Conditions&) {
+Outcome Exponentials() {
   Outcome outcome;
   Shares shares;
   Random random(2);
@@ -89,7 +89,7 @@ Outcome Exponentials(const Conditions&) {
   return outcome;
 }
 
-Outcome ManyBlendedViews(const Conditions&) {
+Outcome ManyBlendedViews() {
   Outcome outcome;
   Shares shares;
   Random random(3);
@@ -102,7 +102,7 @@ Outcome ManyBlendedViews(const Conditions&) {
   return outcome;
 }
 
-Outcome AllUnderflow(const Conditions&) {
+Outcome AllUnderflow() {
   Outcome outcome;
   Shares shares;
   double min_best = 1;
@@ -124,7 +124,7 @@ Outcome AllUnderflow(const Conditions&) {
   return outcome;
 }
 
-Outcome Duplicates(const Conditions&) {
+Outcome Duplicates() {
   Outcome outcome;
   Shares shares;
   Random random(4);
@@ -139,7 +139,7 @@ Outcome Duplicates(const Conditions&) {
   return outcome;
 }
 
-Outcome ZeroAndStraightBehind(const Conditions&) {
+Outcome ZeroAndStraightBehind() {
   Outcome outcome;
   Shares shares;
   for (const BlendWeight weight : kWeights) {

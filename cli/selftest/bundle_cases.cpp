@@ -66,7 +66,7 @@ Outcome Scaled(double scale) {
   return outcome;
 }
 
-Outcome FarFromTheOrigin(const Conditions&) {
+Outcome FarFromTheOrigin() {
   Outcome outcome;
   Similarity moved;
   moved.translation << 1e7, -1e7, 1e7;
@@ -96,7 +96,7 @@ void AddFocalError(const Adjusted& out, double truth_px, double bound, const cha
 
 // One focal length of 9000 px beside coefficients of 0.01; points from 4 to 40 000 units away; a
 // start that is off.
-Outcome MixedMagnitudes(const Conditions&) {
+Outcome MixedMagnitudes() {
   Outcome outcome;
   SceneSpec spec{.points = 400,
                  .lens = {CameraModel::kOpenCv,
@@ -116,7 +116,7 @@ Outcome MixedMagnitudes(const Conditions&) {
   return outcome;
 }
 
-Outcome NearlyFlat(const Conditions&) {
+Outcome NearlyFlat() {
   Outcome outcome;
   SceneSpec spec{.points = 400, .noise_px = 0.3};
   spec.point = [](Random& random) {  // a slab of 4 x 3 units, a thousandth thick
@@ -140,12 +140,11 @@ bool Names(const calib::PhotosValidation& validation, std::initializer_list<cons
 const LensCamera kPinhole{CameraModel::kSimplePinhole, 1000, 800, {900, 500, 400}};
 
 /// What the validation says of data that cannot decide: a named reason and a failed test.
-Outcome Undecided(const SceneSpec& spec, std::initializer_list<const char*> names,
-                  const Conditions& conditions) {
+Outcome Undecided(const SceneSpec& spec, std::initializer_list<const char*> names) {
   Outcome outcome;
   const Bundle bundle = MakeBundle(spec);
   Solve(bundle, LensFreedom::kNoPrincipalPoint, outcome);
-  const calib::PhotosValidation validation = calib::ValidatePhotos(bundle, {}, conditions.threads);
+  const calib::PhotosValidation validation = calib::ValidatePhotos(bundle, {});
   for (const Check& test : validation.tests) outcome.not_finite += std::isnan(test.value);
   outcome.Add(Exactly("the validation names the degeneracy", Names(validation, names), 1,
                       "what the views cannot decide is reported, not guessed"));
@@ -157,7 +156,7 @@ Outcome Undecided(const SceneSpec& spec, std::initializer_list<const char*> name
   return outcome;
 }
 
-Outcome FlatFacedSquarely(const Conditions& conditions) {
+Outcome FlatFacedSquarely() {
   SceneSpec spec{.images = 6, .points = 200, .lens = kPinhole, .noise_px = 0.3};
   spec.pose = [](int i, int) {  // parallel views of a wall: focal length and distance are one
     const Eigen::Vector3d c(0.5 * (i % 3) - 0.5, -6, 0.5 * (i / 3));
@@ -167,10 +166,10 @@ Outcome FlatFacedSquarely(const Conditions& conditions) {
     const double x = random.Uniform(-2, 2);
     return Eigen::Vector3d(x, 0, random.Uniform(-1.5, 1.5));
   };
-  return Undecided(spec, {"planar_scene"}, conditions);
+  return Undecided(spec, {"planar_scene"});
 }
 
-Outcome CentresOnALine(const Conditions&) {
+Outcome CentresOnALine() {
   Outcome outcome;
   SceneSpec spec{.images = 8, .points = 400, .lens = kPinhole, .noise_px = 0.3};
   spec.pose = [](int i, int) {
@@ -184,17 +183,17 @@ Outcome CentresOnALine(const Conditions&) {
 }
 
 // Points within a millionth of a line: every camera may turn about it.
-Outcome PointsOnALine(const Conditions& conditions) {
+Outcome PointsOnALine() {
   SceneSpec spec{.images = 6, .points = 200, .lens = kPinhole, .noise_px = 0.3};
   spec.point = [](Random& random) {
     const double y = 1e-6 * random.Normal();
     return Eigen::Vector3d(random.Uniform(-2, 2), y, 1e-6 * random.Normal());
   };
-  return Undecided(spec, {"collinear_points"}, conditions);
+  return Undecided(spec, {"collinear_points"});
 }
 
 // 1 degree across: 57 296 px of focal length for 1000 px.
-Outcome NarrowLens(const Conditions&) {
+Outcome NarrowLens() {
   Outcome outcome;
   const double focal = 500 / std::tan(0.5 * std::numbers::pi / 180);
   SceneSpec spec{.points = 400,
@@ -215,17 +214,17 @@ Outcome NarrowLens(const Conditions&) {
   return outcome;
 }
 
-Outcome NarrowLensFree(const Conditions& conditions) {
+Outcome NarrowLensFree() {
   SceneSpec spec{.images = 3, .points = 200, .lens = kPinhole, .noise_px = 0.02};
   spec.pose = [](int i, int) {  // 0.1 degrees at the scene's distance
     const Eigen::Vector3d c(0.0052 * i, -6, 0.003 * (i == 1));
     return LookAt(c, {0, 0, 0});
   };
-  return Undecided(spec, {"small_angles", "pure_rotation"}, conditions);
+  return Undecided(spec, {"small_angles", "pure_rotation"});
 }
 
 // 190 degrees across: points beside and behind the cameras' plane, all around.
-Outcome FisheyeOf190Degrees(const Conditions&) {
+Outcome FisheyeOf190Degrees() {
   Outcome outcome;
   const double half = 95 * std::numbers::pi / 180, focal = 500 / half;
   SceneSpec spec{.points = 400,
@@ -258,7 +257,7 @@ Outcome FisheyeOf190Degrees(const Conditions&) {
   return outcome;
 }
 
-Outcome HalfAreOutliers(const Conditions&) {
+Outcome HalfAreOutliers() {
   Outcome outcome;
   Bundle spoiled = MakeBundle({.points = 400, .noise_px = 0.1});
   Random random(3);
@@ -276,7 +275,7 @@ Outcome HalfAreOutliers(const Conditions&) {
   return outcome;
 }
 
-Outcome AMillionPixelsOff(const Conditions&) {
+Outcome AMillionPixelsOff() {
   Outcome outcome;
   const Bundle clean = MakeBundle({.noise_px = 0.1});
   Bundle spoiled = clean;
@@ -290,7 +289,7 @@ Outcome AMillionPixelsOff(const Conditions&) {
   return outcome;
 }
 
-Outcome FocalThirtyPercentOff(const Conditions&) {
+Outcome FocalThirtyPercentOff() {
   Outcome outcome;
   Bundle start = MakeBundle({});
   start.lenses[0].params[0] *= 1.3;
@@ -300,7 +299,7 @@ Outcome FocalThirtyPercentOff(const Conditions&) {
   return outcome;
 }
 
-Outcome AllThirtyPercentOff(const Conditions&) {
+Outcome AllThirtyPercentOff() {
   Outcome outcome;
   const Bundle truth = MakeBundle({.noise_px = 0.3});
   const Adjusted best = Solve(truth, LensFreedom::kNoPrincipalPoint, outcome);
@@ -313,7 +312,7 @@ Outcome AllThirtyPercentOff(const Conditions&) {
   return outcome;
 }
 
-Outcome BrokenNumbers(const Conditions&) {
+Outcome BrokenNumbers() {
   Outcome outcome;
   Bundle broken = MakeBundle({});
   broken.observations[3].pixel.x() = std::nan("");
@@ -324,9 +323,7 @@ Outcome BrokenNumbers(const Conditions&) {
 }  // namespace
 
 std::vector<Case> BundleCases() {
-  const auto scaled = [](double scale) {
-    return [scale](const Conditions&) { return Scaled(scale); };
-  };
+  const auto scaled = [](double scale) { return [scale]() { return Scaled(scale); }; };
   return {{kBundleStage, "world in a unit of 1e-6", true, scaled(1e-6)},
           {kBundleStage, "world in a unit of 1e6", true, scaled(1e6)},
           {kBundleStage, "world 1e7 units from its origin", true, FarFromTheOrigin},

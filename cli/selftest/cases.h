@@ -69,16 +69,11 @@ struct NamedRenderer {
   std::vector<RenderMethod> methods = {RenderMethod::kTwoPass, RenderMethod::kDeferred};
 };
 
-/// What the cases run with.
-struct Conditions {
-  int threads = 0;  ///< 0: all cores; no value depends on it
-};
-
 /// One stiff or extreme case. What it throws fails it.
 struct Case {
   std::string stage, name;
   bool quick = false;  ///< part of the short form
-  std::function<Outcome(const Conditions&)> run;
+  std::function<Outcome()> run;
   std::string skipped = {};  ///< why it cannot be run here; empty: it can
 };
 

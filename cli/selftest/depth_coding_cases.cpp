@@ -91,7 +91,7 @@ class RoundTrips {
   double changed_ = 0, worst_ = 0;
 };
 
-Outcome AllHoles(const Conditions&) {
+Outcome AllHoles() {
   Outcome outcome;
   RoundTrips trips;
   trips.ThroughAllCodings(DepthImage(64, 48), 1, 2, outcome);
@@ -99,7 +99,7 @@ Outcome AllHoles(const Conditions&) {
   return outcome;
 }
 
-Outcome SinglePixel(const Conditions&) {
+Outcome SinglePixel() {
   Outcome outcome;
   RoundTrips trips;
   DepthImage lone(1, 1), in_holes(64, 48);
@@ -110,7 +110,7 @@ Outcome SinglePixel(const Conditions&) {
   return outcome;
 }
 
-Outcome Checkerboard(const Conditions&) {
+Outcome Checkerboard() {
   Outcome outcome;
   RoundTrips trips;
   DepthImage depth(64, 48);
@@ -122,7 +122,7 @@ Outcome Checkerboard(const Conditions&) {
   return outcome;
 }
 
-Outcome EndOfMillimetres(const Conditions&) {
+Outcome EndOfMillimetres() {
   Outcome outcome;
   RoundTrips trips;
   const DepthFormat format{DepthCoding::kPng16Millimetre, 0.0005, 70, LengthUnit::kMetre};
@@ -136,7 +136,7 @@ Outcome EndOfMillimetres(const Conditions&) {
   return outcome;
 }
 
-Outcome EndOfHalf(const Conditions&) {
+Outcome EndOfHalf() {
   Outcome outcome;
   RoundTrips trips;
   const DepthFormat format{DepthCoding::kExrHalf, 1e-3, 1e6, LengthUnit::kUnknown};
@@ -150,7 +150,7 @@ Outcome EndOfHalf(const Conditions&) {
   return outcome;
 }
 
-Outcome Denormals(const Conditions&) {
+Outcome Denormals() {
   Outcome outcome;
   constexpr float kSmallest = std::numeric_limits<float>::denorm_min();
   DepthImage depth(4, 1);
@@ -167,7 +167,7 @@ Outcome Denormals(const Conditions&) {
 }
 
 // The range reaches from a denormal to 1: 1/near is 1e40, far beyond float.
-Outcome RangeFromADenormal(const Conditions&) {
+Outcome RangeFromADenormal() {
   Outcome outcome;
   RoundTrips trips;
   DepthImage depth(3, 1);
@@ -198,7 +198,7 @@ double MovedEnds(DepthCoding coding, int steps, Outcome& outcome) {
   return moved;
 }
 
-Outcome RangeEnds(const Conditions&) {
+Outcome RangeEnds() {
   Outcome outcome;
   for (const auto& [coding, steps] : kInverseCodings) {
     outcome.Add(Exactly(std::string("ranges whose ends move, ") + io::NameOf(coding) + " of " +
@@ -208,7 +208,7 @@ Outcome RangeEnds(const Conditions&) {
   return outcome;
 }
 
-Outcome NoNumbers(const Conditions&) {
+Outcome NoNumbers() {
   Outcome outcome;
   for (const auto& [bad, name] :
        {std::pair{std::numeric_limits<float>::quiet_NaN(), "NaN"},

@@ -13,7 +13,6 @@ const char* InWords(RenderMethod method) {
 }
 
 RenderResult Drawing::Draw(const RenderScene& scene, const Shot& novel, RenderOptions options) {
-  options.threads = threads_;
   RenderResult result = render_(scene, novel.camera, novel.cam_from_world, options);
   contradictions_ += testing::Contradictions(result);
   for (const float z : result.depth.grid().data()) not_finite_ += !std::isfinite(z);

@@ -14,8 +14,7 @@ const char* InWords(RenderMethod method);  ///< ", two passes", to end a measure
 /// What a case draws with: one renderer, counts of what is wrong with its images.
 class Drawing {
  public:
-  Drawing(const NamedRenderer& renderer, const Conditions& conditions)
-      : render_(renderer.make()), methods_(renderer.methods), threads_(conditions.threads) {}
+  Drawing(const NamedRenderer& renderer) : render_(renderer.make()), methods_(renderer.methods) {}
 
   const std::vector<RenderMethod>& methods() const { return methods_; }  ///< that it draws
 
@@ -32,7 +31,6 @@ class Drawing {
   std::deque<DtrSet> kept_;
   RenderFunction render_;
   std::vector<RenderMethod> methods_;
-  int threads_;
   long long contradictions_ = 0, not_finite_ = 0;
 };
 

@@ -325,10 +325,7 @@ std::vector<Case> RenderingCases(std::span<const NamedRenderer> renderers) {
   for (const NamedRenderer& renderer : renderers) {
     for (const auto& [name, run] : kCases) {
       all.push_back({"Rendering, " + renderer.name, name, run != ManyViews,
-                     [renderer, run = run](const Conditions& conditions) {
-                       return run(Drawing(renderer, conditions));
-                     },
-                     renderer.missing});
+                     [renderer, run = run]() { return run(Drawing(renderer)); }, renderer.missing});
     }
   }
   return all;

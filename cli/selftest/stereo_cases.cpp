@@ -65,9 +65,8 @@ double LimitPx(const Shot& shot) {
   return kWindowFactor * MatchingLimitPx(shot.image, {1, 0}, kNoise);
 }
 
-DepthEstimate Run(const std::vector<StereoView>& views, const DepthRange& range,
-                  const Conditions& conditions, Outcome& outcome) {
-  DepthEstimate estimate = stereo::testing::WholeRun(views, range, conditions.threads);
+DepthEstimate Run(const std::vector<StereoView>& views, const DepthRange& range, Outcome& outcome) {
+  DepthEstimate estimate = stereo::testing::WholeRun(views, range);
   outcome.LookAtAll(estimate.depth.grid().data());
   outcome.LookAtAll(estimate.inverse_depth_sigma.data());
   return estimate;
@@ -90,7 +89,7 @@ void AddNothingKept(const Score& score, double most, const char* reason, Outcome
 }
 
 /// A lens so long that the range is the same number of pixels of disparity at any baseline.
-Outcome SmallBaseline(double baseline_over_depth, const Conditions& conditions) {
+Outcome SmallBaseline(double baseline_over_depth) {
   Outcome outcome;
   const double baseline = 4 * baseline_over_depth, longer = 140 * 1e-4 / baseline_over_depth;
   const PinholeCamera camera(kWidth, kHeight, longer * kFocal, longer * kFocal, 0.5 * kWidth,
@@ -100,32 +99,31 @@ Outcome SmallBaseline(double baseline_over_depth, const Conditions& conditions) 
     shots.push_back(Photograph(Slanted(), camera, Facing({x, 0, 0}), kTextureSize / longer));
   }
   const auto views = ViewsOf(shots);
-  const Score score = ScoreFirst(views, Run(views, kRange, conditions, outcome), shots[0].truth);
+  const Score score = ScoreFirst(views, Run(views, kRange, outcome), shots[0].truth);
   AddScore(score, shots[0], {}, outcome);
   outcome.Add(AtLeast("errors within 3 of their own sigmas, share", score.within_3_sigma, 0.95,
                       "a sigma that is too small would be a lie; 0.997 for a normal law"));
   return outcome;
 }
 
-Outcome LessThanNoise(const Conditions& conditions) {
+Outcome LessThanNoise() {
   Outcome outcome;  // the whole range, 2.5 to 8, is 0.01 px of disparity
   const auto shots = ShotsFrom(Slanted(), {Facing({0, 0, 0}), Facing({4e-4, 0, 0})});
   const auto views = ViewsOf(shots);
-  AddNothingKept(ScoreFirst(views, Run(views, kRange, conditions, outcome), shots[0].truth), 0,
+  AddNothingKept(ScoreFirst(views, Run(views, kRange, outcome), shots[0].truth), 0,
                  "the whole range is 0.01 px of disparity: nothing can be determined", outcome);
   return outcome;
 }
 
-Outcome BaselineOfATenth(const Conditions& conditions) {
+Outcome BaselineOfATenth() {
   Outcome outcome;
   const auto shots = ShotsFrom(Slanted(), {Facing({0, 0, 0}), Facing({0.4, 0, 0})});
   const auto views = ViewsOf(shots);
-  AddScore(ScoreFirst(views, Run(views, kRange, conditions, outcome), shots[0].truth), shots[0], {},
-           outcome);
+  AddScore(ScoreFirst(views, Run(views, kRange, outcome), shots[0].truth), shots[0], {}, outcome);
   return outcome;
 }
 
-Outcome BaselineAsLongAsTheDepth(const Conditions& conditions) {
+Outcome BaselineAsLongAsTheDepth() {
   Outcome outcome;
   const Vector3d target(0, 0, 4);
   const auto shots =
@@ -142,12 +140,12 @@ Outcome BaselineAsLongAsTheDepth(const Conditions& conditions) {
       .past_reason =
           "wrong depth is worse than none: one pixel in a hundred, a choice, and two more "
           "where the two images' common part ends, whose windows are cut"};
-  AddScore(ScoreFirst(views, Run(views, kRange, conditions, outcome), shots[0].truth), shots[0],
-           expected, outcome);
+  AddScore(ScoreFirst(views, Run(views, kRange, outcome), shots[0].truth), shots[0], expected,
+           outcome);
   return outcome;
 }
 
-Outcome DepthsOneToAThousand(const Conditions& conditions) {
+Outcome DepthsOneToAThousand() {
   Outcome outcome;
   const auto surface =
       stereo::testing::Union({stereo::testing::Sphere({0, 0, 1.3}, 0.3), Plane({0, 0, 1}, 1000)});
@@ -160,7 +158,7 @@ Outcome DepthsOneToAThousand(const Conditions& conditions) {
   }
   const auto views = ViewsOf(shots);
   const DepthImage& truth = shots[0].truth;
-  const DepthEstimate estimate = Run(views, {0.8, 1500}, conditions, outcome);
+  const DepthEstimate estimate = Run(views, {0.8, 1500}, outcome);
   Expected expected{.max_past_1px = 0.02,
                     .past_reason =
                         "wrong depth is worse than none: two pixels in a hundred, a choice: one of "
@@ -178,7 +176,7 @@ Outcome DepthsOneToAThousand(const Conditions& conditions) {
   return outcome;
 }
 
-Outcome WithoutTexture(const Conditions& conditions) {
+Outcome WithoutTexture() {
   Outcome outcome;
   auto shots = ShotsFrom(Plane({0, 0, 1}, 4),
                          {Facing({0, 0, 0}), Facing({0.4, 0, 0}), Facing({-0.4, 0, 0})});
@@ -189,12 +187,12 @@ Outcome WithoutTexture(const Conditions& conditions) {
     }
   }
   const auto views = ViewsOf(shots);
-  AddNothingKept(ScoreFirst(views, Run(views, kRange, conditions, outcome), shots[0].truth), 0.01,
+  AddNothingKept(ScoreFirst(views, Run(views, kRange, outcome), shots[0].truth), 0.01,
                  "noise of one level agrees by chance alone", outcome);
   return outcome;
 }
 
-Outcome Repetition(const Conditions& conditions) {
+Outcome Repetition() {
   Outcome outcome;
   // A period of 5 px of disparity; the range has 15. Other views on both sides at equal distances:
   // every period is as right in all of them.
@@ -210,9 +208,9 @@ Outcome Repetition(const Conditions& conditions) {
   for (const size_t count : {2, 3}) {
     std::vector<StereoView> views = ViewsOf(shots);
     views.resize(count);
-    AddNothingKept(ScoreFirst(views, Run(views, {2, 16}, conditions, outcome), shots[0].truth),
-                   0.05, "three depths explain the images alike; a border of one pixel is 5 %",
-                   outcome, count == 2 ? ", 2 views" : ", 3 views");
+    AddNothingKept(ScoreFirst(views, Run(views, {2, 16}, outcome), shots[0].truth), 0.05,
+                   "three depths explain the images alike; a border of one pixel is 5 %", outcome,
+                   count == 2 ? ", 2 views" : ", 3 views");
   }
   return outcome;
 }
@@ -230,25 +228,24 @@ void Expose(double factor, ImageRgb8& image) {
   }
 }
 
-Outcome Exposure(const Conditions& conditions) {
+Outcome Exposure() {
   Outcome outcome;
   auto shots = ShotsFrom(Slanted(), {Facing({0, 0, 0}), Facing({0.4, 0, 0}), Facing({-0.4, 0, 0})});
   Expose(2.0, shots[1].image);
   Expose(0.5, shots[2].image);
   const auto views = ViewsOf(shots);
-  AddScore(ScoreFirst(views, Run(views, kRange, conditions, outcome), shots[0].truth), shots[0], {},
-           outcome);
+  AddScore(ScoreFirst(views, Run(views, kRange, outcome), shots[0].truth), shots[0], {}, outcome);
   return outcome;
 }
 
-Outcome OneBit(const Conditions& conditions) {
+Outcome OneBit() {
   Outcome outcome;
   auto shots = ShotsFrom(Slanted(), {Facing({0, 0, 0}), Facing({0.4, 0, 0}), Facing({-0.4, 0, 0})});
   for (Shot& shot : shots) {
     for (std::uint8_t& value : shot.image.data()) value = value < 128 ? 0 : 255;
   }
   const auto views = ViewsOf(shots);
-  const Score score = ScoreFirst(views, Run(views, kRange, conditions, outcome), shots[0].truth);
+  const Score score = ScoreFirst(views, Run(views, kRange, outcome), shots[0].truth);
   outcome.Add(AtLeast("share of pixels with depth", score.kept, 0.5,
                       "where a window holds an edge; black and white areas have none"));
   outcome.Add(AtMost("median error, px", score.median_px, 0.5 / std::sqrt(3.0),
@@ -258,17 +255,17 @@ Outcome OneBit(const Conditions& conditions) {
   return outcome;
 }
 
-Outcome CopiesOfOnePhoto(const Conditions& conditions) {
+Outcome CopiesOfOnePhoto() {
   Outcome outcome;  // all lies at infinity, which the range excludes
   auto shots = ShotsFrom(Slanted(), {Facing({0, 0, 0}), Facing({0.4, 0, 0}), Facing({0, 0, 0})});
   shots[1].image = shots[0].image;
   const auto views = ViewsOf(shots);
-  AddNothingKept(ScoreFirst({views[0], views[1]},
-                            Run({views[0], views[1]}, kRange, conditions, outcome), shots[0].truth),
-                 0.05, "zero disparity is infinity, beyond the range", outcome, ", other position");
-  AddNothingKept(ScoreFirst({views[0], views[2]},
-                            Run({views[0], views[2]}, kRange, conditions, outcome), shots[0].truth),
-                 0, "no baseline", outcome, ", same position");
+  AddNothingKept(
+      ScoreFirst({views[0], views[1]}, Run({views[0], views[1]}, kRange, outcome), shots[0].truth),
+      0.05, "zero disparity is infinity, beyond the range", outcome, ", other position");
+  AddNothingKept(
+      ScoreFirst({views[0], views[2]}, Run({views[0], views[2]}, kRange, outcome), shots[0].truth),
+      0, "no baseline", outcome, ", same position");
   return outcome;
 }
 
@@ -284,7 +281,7 @@ double ChangedShare(const DepthImage& base, const DepthImage& other, double scal
   return static_cast<double>(changed) / (kWidth * kHeight);
 }
 
-Outcome UnitAndOrigin(const Conditions& conditions) {
+Outcome UnitAndOrigin() {
   Outcome outcome;
   const auto shots = ShotsFrom(
       SphereBeforeWall(), {Facing({0, 0, 0}), Facing({0.4, 0, 0}, 10), Facing({0, 0.4, 0}, -5)});
@@ -294,7 +291,7 @@ Outcome UnitAndOrigin(const Conditions& conditions) {
       const Vector3d centre = scale * view.cam_from_world.TargetOriginInSource() + offset;
       view.cam_from_world.translation = -(view.cam_from_world.rotation * centre);
     }
-    return Run(views, {kRange.near_z * scale, kRange.far_z * scale}, conditions, outcome).depth;
+    return Run(views, {kRange.near_z * scale, kRange.far_z * scale}, outcome).depth;
   };
   const DepthImage base = in_world(1, {0, 0, 0});
   const char* reason = "the world's unit and origin do not matter";
@@ -311,9 +308,7 @@ Outcome UnitAndOrigin(const Conditions& conditions) {
 }  // namespace
 
 std::vector<Case> StereoCases() {
-  const auto baseline = [](double share) {
-    return [share](const Conditions& conditions) { return SmallBaseline(share, conditions); };
-  };
+  const auto baseline = [](double share) { return [share]() { return SmallBaseline(share); }; };
   return {{kStereoStage, "baseline / depth 1e-4, a long lens", true, baseline(1e-4)},
           {kStereoStage, "baseline / depth 1e-3, a long lens", false, baseline(1e-3)},
           {kStereoStage, "baseline / depth 1e-2, a long lens", false, baseline(1e-2)},

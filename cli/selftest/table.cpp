@@ -104,8 +104,7 @@ bool Row::passed() const {
          std::ranges::all_of(outcome.measures, Holds);
 }
 
-std::vector<Row> RunCases(const std::vector<Case>& cases, const Conditions& conditions,
-                          bool quick_only, Progress& progress) {
+std::vector<Row> RunCases(const std::vector<Case>& cases, bool quick_only, Progress& progress) {
   std::vector<const Case*> chosen;
   for (const Case& each : cases) {
     if (each.quick || !quick_only) chosen.push_back(&each);
@@ -116,7 +115,7 @@ std::vector<Row> RunCases(const std::vector<Case>& cases, const Conditions& cond
     if (progress.StopRequested()) break;
     Row row{each->stage, each->name, each->quick, {}, {}, each->skipped};
     try {
-      if (row.skipped.empty()) row.outcome = each->run(conditions);
+      if (row.skipped.empty()) row.outcome = each->run();
     } catch (const std::exception& error) {  // a case that throws must not end the others
       row.error = error.what();
     }

@@ -23,8 +23,7 @@ struct Row {
 
 /// Runs the cases one after the other, only the quick ones if `quick_only`. Ends early, with the
 /// rows so far, where `progress` asks for it.
-std::vector<Row> RunCases(const std::vector<Case>& cases, const Conditions& conditions,
-                          bool quick_only, Progress& progress);
+std::vector<Row> RunCases(const std::vector<Case>& cases, bool quick_only, Progress& progress);
 
 /// "58 of 68 cases hold", and how many failed or were skipped, with the reasons.
 std::string Summary(const std::vector<Row>& rows);

@@ -33,11 +33,11 @@ inline std::vector<StereoView> ViewsOf(const std::vector<Shot>& shots) {
 
 /// Depth of the first view, all others being its neighbours.
 inline DepthEstimate EstimateFirstBy(const std::string& engine,
-                                     const std::vector<StereoView>& views, const DepthRange& range,
-                                     int threads) {
+                                     const std::vector<StereoView>& views,
+                                     const DepthRange& range) {
   std::vector<int> neighbours;
   for (int i = 1; i < static_cast<int>(views.size()); ++i) neighbours.push_back(i);
-  return MakeEngine(engine)->Estimate(views, 0, neighbours, range, {.threads = threads});
+  return MakeEngine(engine)->Estimate(views, 0, neighbours, range, {});
 }
 
 struct Quality {

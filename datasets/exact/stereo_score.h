@@ -114,8 +114,7 @@ inline Score ScoreFirst(const std::vector<StereoView>& views, const DepthEstimat
 
 /// The first view's depth as a user gets it: search, rounds and both checks, with all other views
 /// as everyone's neighbours.
-inline DepthEstimate WholeRun(const std::vector<StereoView>& views, const DepthRange& range,
-                              int threads = 2) {
+inline DepthEstimate WholeRun(const std::vector<StereoView>& views, const DepthRange& range) {
   const auto engine = MakeEngine("patchmatch");
   const std::vector<DepthRange> ranges(views.size(), range);
   std::vector<ViewNeighbours> neighbours(views.size());
@@ -125,7 +124,7 @@ inline DepthEstimate WholeRun(const std::vector<StereoView>& views, const DepthR
     std::copy_if(all.begin(), all.end(), std::back_inserter(neighbours[v].views),
                  [v](int other) { return other != static_cast<int>(v); });
   }
-  const Collection collection{views, neighbours, ranges, engine.get(), {.threads = threads}};
+  const Collection collection{views, neighbours, ranges, engine.get(), {}};
   PlaneMapsInMemory planes;
   SilentProgress progress;
   RunRounds(collection, all, planes, progress);
@@ -143,7 +142,7 @@ inline DepthEstimate WholeRun(const std::vector<StereoView>& views, const DepthR
   }
   std::vector<OtherDepth> others;
   for (size_t v = 1; v < views.size(); ++v) others.push_back({&views[v], &judged[v]});
-  return FilterByConsistency(views[0], judged[0], others, {}, threads);
+  return FilterByConsistency(views[0], judged[0], others, {});
 }
 
 }  // namespace dtr::stereo::testing

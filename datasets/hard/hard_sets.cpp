@@ -36,7 +36,7 @@ Grid<float> Blurred(const Grid<float>& light, int width_px, int half_px) {
 }
 
 void WritePhoto(const Scene& scene, const HardPhoto& photo, std::uint64_t index,
-                const fs::path& file, int threads) {
+                const fs::path& file) {
   constexpr std::uint64_t kSeed = 77;
   constexpr int kJpegQuality = 95;
   PhotoOptions options;
@@ -44,7 +44,6 @@ void WritePhoto(const Scene& scene, const HardPhoto& photo, std::uint64_t index,
   options.noise_sigma = 1.5;
   options.gain = photo.gain;
   options.seed = kSeed + index;
-  options.threads = threads;
   const PinholeCamera camera = MakeCamera(photo.width_px, photo.height_px, photo.focal_35mm);
   Grid<float> light = RenderLight(scene, camera, photo.cam_from_world, options);
   if (photo.blur_px > 0) light = Blurred(light, photo.width_px, photo.blur_px);
@@ -58,7 +57,7 @@ void WritePhoto(const Scene& scene, const HardPhoto& photo, std::uint64_t index,
 
 }  // namespace
 
-void WriteHardSet(const HardSet& set, const fs::path& folder, int threads) {
+void WriteHardSet(const HardSet& set, const fs::path& folder) {
   if (WorkFolder::IsTaken(folder, "hard set")) {
     throw UsageError(folder.string() +
                      ": expected a folder that does not exist yet; remove it or choose another "
@@ -73,7 +72,7 @@ void WriteHardSet(const HardSet& set, const fs::path& folder, int threads) {
     camera.name = fmt::format("{:04}.jpg", i);
     camera.camera = MakeCamera(photo.width_px, photo.height_px, photo.focal_35mm);
     camera.cam_from_world = photo.cam_from_world;
-    WritePhoto(*set.scene, photo, i, work.path() / "photos" / camera.name, threads);
+    WritePhoto(*set.scene, photo, i, work.path() / "photos" / camera.name);
     list.cameras.push_back(std::move(camera));
   }
   io::WriteCamerasJson(work.path() / "cameras.json", list);

@@ -34,6 +34,6 @@ std::vector<HardSet> HardSets();
 /// Writes `photos/0000.jpg`, ... and `cameras.json`, the exact cameras, into `folder`, which must
 /// not exist yet; the same bytes for any number of threads. Throws UsageError where it exists,
 /// Error where it cannot be written.
-void WriteHardSet(const HardSet& set, const std::filesystem::path& folder, int threads);
+void WriteHardSet(const HardSet& set, const std::filesystem::path& folder);
 
 }  // namespace dtr::datasets

@@ -83,7 +83,7 @@ std::vector<Addition> ChooseAdditions(std::vector<Place> places, std::vector<Loo
     progress.ThrowIfInterrupted();
     const std::vector<size_t> tried = WorstPlaces(places, options);
     std::vector<double> gains(tried.size());
-    ParallelFor(0, static_cast<int>(tried.size()), options.threads, [&](int i) {
+    ParallelFor(0, static_cast<int>(tried.size()), [&](int i) {
       const auto at = static_cast<size_t>(i);
       gains[at] = GainOf(places, looks, tried[at], options);
     });
@@ -156,7 +156,7 @@ Advice Advise(std::span<const CoarseView> views, const AdviseOptions& options, P
   progress.Stage("looking from new positions", count);
   std::vector<Look> looks(advice.places.size());
   std::atomic<int> done{0};
-  ParallelFor(0, count, options.threads, [&](int i) {
+  ParallelFor(0, count, [&](int i) {
     progress.ThrowIfInterrupted();
     const auto at = static_cast<size_t>(i);
     looks[at] = LookFrom(advice.places[at], staying);

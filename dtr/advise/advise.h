@@ -19,7 +19,6 @@ struct AdviseOptions {
   /// A camera adds nothing where others show this share of its points, as large and from nearby.
   double redundant_share = 0.99;
   int max_cameras_to_add = 5;
-  int threads = 0;  ///< 0: all cores
 };
 
 /// A place from which people will look, and what the photos know of what it sees.

@@ -72,7 +72,7 @@ std::vector<Redundant> FindRedundant(std::span<const CoarseView> views,
   const double max_angle = options.max_gap_deg / 2 * std::numbers::pi / 180;
   std::vector<Shown> shown(views.size());
   std::atomic<int> done{0};
-  ParallelFor(0, count, options.threads, [&](int i) {
+  ParallelFor(0, count, [&](int i) {
     progress.ThrowIfInterrupted();
     shown[static_cast<size_t>(i)] = ShownOf(views, static_cast<size_t>(i), max_angle);
     progress.Update(++done);

@@ -8,6 +8,9 @@ namespace dtr {
 /// The processor as it calls itself, "unknown" where the system does not say.
 std::string CpuModel();
 
+/// The processors that the system shows, at least 1.
+int Cores();
+
 /// Processor time of this process so far, all threads, in milliseconds. Unlike a clock on the wall
 /// it does not count what other programs used.
 double ProcessCpuMilliseconds();

@@ -1,23 +1,33 @@
 #include "dtr/base/parallel_for.h"
 
 #include <algorithm>
-#include <thread>
 
+#include "dtr/base/machine.h"
 #include "dtr/base/thread_pool.h"
 #include "dtr/base/trace.h"
 
 namespace dtr {
+namespace {
 
-int ResolveThreads(int requested) {
-  if (requested > 0) return requested;
-  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+thread_local int thread_limit = 0;
+
+}  // namespace
+
+ThreadLimit::ThreadLimit(int threads) : before_(thread_limit) { thread_limit = threads; }
+
+ThreadLimit::~ThreadLimit() { thread_limit = before_; }
+
+int ThreadLimit::Current() { return thread_limit > 0 ? thread_limit : Cores(); }
+
+void ParallelFor(int begin, int end, const std::function<void(int)>& body) {
+  ParallelFor(begin, end, end - begin, body);
 }
 
-void ParallelFor(int begin, int end, int threads, const std::function<void(int)>& body) {
+void ParallelFor(int begin, int end, int at_once, const std::function<void(int)>& body) {
   if (begin >= end) return;
-  const int request = ResolveThreads(threads);
-  const int limit = std::min(request, end - begin);
-  if (limit == 1) {
+  const int request = ThreadLimit::Current();
+  const int limit = std::min({request, end - begin, at_once});
+  if (limit <= 1) {
     for (int i = begin; i < end; ++i) body(i);
     return;
   }

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <thread>
 
+#include "dtr/base/parallel_for.h"
+
 namespace dtr {
 namespace {
 
@@ -20,6 +22,7 @@ Loop::Loop(int begin, int end, int limit, int request, const std::function<void(
            Loop* parent)
     : end_(end),
       limit_(limit),
+      request_(request),
       body_(body),
       parent_(parent),
       root_(parent != nullptr ? parent->root_ : this),
@@ -28,6 +31,7 @@ Loop::Loop(int begin, int end, int limit, int request, const std::function<void(
       max_running_(request) {}
 
 void Loop::RunItems(bool by_caller) {
+  const ThreadLimit limit(request_);  // its caller's
   Loop* const around = current_loop;
   current_loop = this;
   while (!failed_.load(std::memory_order_relaxed)) {

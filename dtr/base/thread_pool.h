@@ -25,7 +25,7 @@ class Loop {
   void RunItems(bool by_caller);
   bool IsInside(const Loop* ancestor) const;
 
-  const int end_, limit_;
+  const int end_, limit_, request_;
   const std::function<void(int)>& body_;
   Loop* const parent_;
   Loop* const root_;

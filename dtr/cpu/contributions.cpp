@@ -25,7 +25,7 @@ Contributions ContributionsTo(const DepthImage& depth, const RenderScene& scene,
   std::vector<double> start;
   for (const float z : depth.grid().data()) start.push_back(DepthImage::IsHole(z) ? 0 : 1.0 / z);
   std::vector<Layer> layers(setup.views.size(), Layer(Band{}));
-  ParallelFor(0, static_cast<int>(layers.size()), options.threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(layers.size()), [&](int i) {
     const auto k = static_cast<size_t>(i);
     layers[k] = FindOwnFragments(setup.placed[k], novel, options, whole, start);
   });
@@ -40,7 +40,7 @@ Contributions ContributionsTo(const DepthImage& depth, const RenderScene& scene,
   }
   contributions.shares.assign(layers.size(), Grid<float>(novel.width_px(), novel.height_px()));
   RenderResult result = EmptyResult(novel);
-  ParallelFor(0, novel.height_px(), options.threads, [&](int y) {
+  ParallelFor(0, novel.height_px(), [&](int y) {
     ResolveRow(setup.settings, setup.views, y, result, contributions.shares);
   });
   return contributions;

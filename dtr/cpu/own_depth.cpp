@@ -202,7 +202,7 @@ void KeepSupportedSurfaces(std::span<const ViewInNovel> views, const PinholeCame
     }
     return 0.0;
   };
-  ParallelFor(0, band.rows, options.threads, [&](int row) {
+  ParallelFor(0, band.rows, [&](int row) {
     for (int x = 0; x < band.width_px; ++x) {
       double& surface = surfaces[static_cast<size_t>(row) * static_cast<size_t>(band.width_px) +
                                  static_cast<size_t>(x)];

@@ -33,10 +33,10 @@ std::vector<AdaptiveMesh> MakeMeshes(const std::vector<ViewInNovel>& views,
   std::vector<AdaptiveMesh> meshes;
   if (options.method != RenderMethod::kDeferred) return meshes;
   meshes.resize(views.size());
-  ParallelFor(0, static_cast<int>(views.size()), options.threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(views.size()), [&](int i) {
     const auto k = static_cast<size_t>(i);
     std::string unfit;  // of a stored cover; the mesh is the same without it
-    meshes[k] = MakeAdaptiveMesh(*views[k].view, options, 1, unfit);
+    meshes[k] = MakeAdaptiveMesh(*views[k].view, options, unfit);
   });
   return meshes;
 }
@@ -49,7 +49,7 @@ std::vector<Layer> DrawLayers(const std::vector<ViewInNovel>& views,
   const int count = static_cast<int>(views.size());
   std::vector<Layer> layers(views.size(), Layer(Band{}));
   const auto fill = [&](const auto& make_layer) {
-    ParallelFor(0, count, options.threads, [&](int i) {
+    ParallelFor(0, count, [&](int i) {
       const auto k = static_cast<size_t>(i);
       layers[k] = make_layer(k);
     });
@@ -87,7 +87,7 @@ RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
     const std::vector<Layer> layers =
         DrawLayers(setup.placed, meshes, novel, options, setup.settings.blend, band);
     for (size_t i = 0; i < views.size(); ++i) views[i].layer = &layers[i];
-    ParallelFor(band.first_row, band.first_row + band.rows, options.threads,
+    ParallelFor(band.first_row, band.first_row + band.rows,
                 [&](int y) { ResolveRow(setup.settings, views, y, result); });
   }
   if (const auto curve = CurveOf(setup.exposure)) {

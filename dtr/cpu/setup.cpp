@@ -38,7 +38,7 @@ Setup MakeSetup(const RenderScene& scene, const ViewSelection& selection,
   }
   setup.exposure = FrameExposure(scene, selection, novel_from_world);
   setup.views.resize(setup.order.size());
-  ParallelFor(0, static_cast<int>(setup.views.size()), options.threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(setup.views.size()), [&](int i) {
     const ViewInNovel& placed = setup.placed[static_cast<size_t>(i)];
     ResolveView& view = setup.views[static_cast<size_t>(i)];
     view.in_novel = &placed;

@@ -178,8 +178,8 @@ CrossDepthOfView ThroughNeighbours(const Surface& view, std::span<const Surface>
 /// Depth maps as far as they are needed: those in memory stay where they are, others are brought.
 class DepthMaps {
  public:
-  DepthMaps(std::span<const View* const> views, const DepthLoader& load, int threads)
-      : views_(views), load_(load), threads_(threads), own_(views.size()) {
+  DepthMaps(std::span<const View* const> views, const DepthLoader& load)
+      : views_(views), load_(load), own_(views.size()) {
     for (const View* view : views) grids_.push_back(view->DepthCamera());
   }
 
@@ -200,7 +200,7 @@ class DepthMaps {
         missing.push_back(i);
       }
     }
-    ParallelFor(0, static_cast<int>(missing.size()), threads_, [&](int at) {
+    ParallelFor(0, static_cast<int>(missing.size()), [&](int at) {
       const size_t i = missing[static_cast<size_t>(at)];
       own_[i] = load_(*views_[i]);
     });
@@ -224,7 +224,6 @@ class DepthMaps {
 
   std::span<const View* const> views_;
   const DepthLoader& load_;
-  int threads_;
   std::vector<PinholeCamera> grids_;
   std::vector<DepthImage> own_;
 };
@@ -235,7 +234,7 @@ CrossDepthReport Compare(std::span<const View* const> views, const CrossDepthOpt
     throw Error(
         fmt::format("cross check: expected at least 2 views with depth, found {}", views.size()));
   }
-  DepthMaps maps(views, load, options.threads);
+  DepthMaps maps(views, load);
   std::vector<std::vector<size_t>> neighbours;
   for (size_t i = 0; i < views.size(); ++i) neighbours.push_back(Neighbours(views, i, options));
   CrossDepthReport report;
@@ -254,7 +253,7 @@ CrossDepthReport Compare(std::span<const View* const> views, const CrossDepthOpt
       needed = std::move(more);
     }
     maps.Hold(needed);
-    ParallelFor(static_cast<int>(begin), static_cast<int>(end), options.threads, [&](int item) {
+    ParallelFor(static_cast<int>(begin), static_cast<int>(end), [&](int item) {
       const auto i = static_cast<size_t>(item);
       std::vector<Surface> others;
       for (const size_t n : neighbours[i]) others.push_back(maps.At(n));

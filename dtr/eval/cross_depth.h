@@ -23,7 +23,6 @@ struct CrossDepthOptions {
   /// Depth maps that are held at a time where they are brought one by one; a view and its
   /// neighbours are, whatever they take. The result does not depend on it.
   size_t memory_bytes = size_t{1} << 30;
-  int threads = 0;  ///< 0: all cores; the result does not depend on it
 };
 
 /// Round trips of one view's depth through its neighbours.

@@ -57,7 +57,7 @@ Mask HasOwnDepth(const View& view) {
   return mask;
 }
 
-ViewScore Score(const View& view, const RenderResult& filled, int threads) {
+ViewScore Score(const View& view, const RenderResult& filled) {
   ViewScore score;
   score.name = view.name;
   score.psnr_db = Psnr(filled.image, view.image, view.mask);
@@ -68,7 +68,7 @@ ViewScore Score(const View& view, const RenderResult& filled, int threads) {
     score.psnr_own_depth_db =
         Psnr(filled.image, view.image, Intersect(HasOwnDepth(view), view.mask));
   }
-  score.ssim = Ssim(filled.image, view.image, view.mask, threads);
+  score.ssim = Ssim(filled.image, view.image, view.mask);
   score.coverage = ShareOf(filled.coverage, view.mask);
   score.views_used = static_cast<int>(filled.views_used.size());
   return score;
@@ -110,7 +110,7 @@ EvaluationReport EvaluateHeldOut(const DtrSet& set, const EvaluateOptions& optio
     const RenderResult filled = render(scene, view->camera, view->cam_from_world, render_options);
     const std::chrono::duration<double, std::milli> elapsed =
         std::chrono::steady_clock::now() - start;
-    report.views.push_back(Score(*view, filled, options.render.threads));
+    report.views.push_back(Score(*view, filled));
     report.views.back().render_ms = elapsed.count();
     if (options.on_rendered) options.on_rendered(*view, filled);
     progress.Update(static_cast<int>(report.views.size()));

@@ -140,8 +140,7 @@ std::vector<std::string> IdenticalFigures(
   return names;
 }
 
-std::optional<double> Ssim(const ImageRgb8& image, const ImageRgb8& reference, const Mask& mask,
-                           int threads) {
+std::optional<double> Ssim(const ImageRgb8& image, const ImageRgb8& reference, const Mask& mask) {
   RequireSameSize(image, reference, mask);
   const int columns = image.width() - kWindow + 1, rows = image.height() - kWindow + 1;
   if (columns < 1 || rows < 1) return std::nullopt;
@@ -151,7 +150,7 @@ std::optional<double> Ssim(const ImageRgb8& image, const ImageRgb8& reference, c
   // One slot per row, summed in order below: the same bits for any number of threads.
   std::vector<double> row_sum(static_cast<size_t>(rows), 0.0);
   std::vector<long long> row_count(static_cast<size_t>(rows), 0);
-  ParallelFor(0, rows, threads, [&](int y) {
+  ParallelFor(0, rows, [&](int y) {
     std::vector<Moments> column(static_cast<size_t>(image.width()));
     for (int c = 0; c < 3; ++c) {
       for (int x = 0; x < image.width(); ++x) {

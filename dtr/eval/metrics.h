@@ -42,8 +42,7 @@ std::vector<std::string> IdenticalFigures(
 /// TIP 2004, eq. 13). As in the authors' reference, only windows that lie in the image count
 /// ('valid'), and nothing is downsampled. With a mask, only windows free of masked pixels count.
 /// Empty when no window is left. The result does not depend on `threads` (0: all cores).
-std::optional<double> Ssim(const ImageRgb8& image, const ImageRgb8& reference, const Mask& mask,
-                           int threads = 0);
+std::optional<double> Ssim(const ImageRgb8& image, const ImageRgb8& reference, const Mask& mask);
 
 /// 255 where both masks are; an empty mask is all 255. Sizes must agree (std::invalid_argument).
 Mask Intersect(const Mask& a, const Mask& b);

@@ -53,13 +53,12 @@ bool Sees(const TrueView& view, const Eigen::Vector3d& p_in_world) {
   return DepthImage::IsHole(nearest) || p.z() <= nearest * (1 + kOnEdgeSurface);
 }
 
-Grid<std::uint8_t> CountSeenBy(const TrueView& novel, std::span<const TrueView> others,
-                               int threads) {
+Grid<std::uint8_t> CountSeenBy(const TrueView& novel, std::span<const TrueView> others) {
   RequireDepth(novel);
   for (const TrueView& other : others) RequireDepth(other);
   const Pose world_from_novel = novel.cam_from_world.Inverse();
   Grid<std::uint8_t> count(novel.camera.width_px(), novel.camera.height_px());
-  ParallelFor(0, count.height(), threads, [&](int y) {
+  ParallelFor(0, count.height(), [&](int y) {
     for (int x = 0; x < count.width(); ++x) {
       const float z = (*novel.depth)(x, y);
       if (DepthImage::IsHole(z)) continue;
@@ -74,8 +73,8 @@ Grid<std::uint8_t> CountSeenBy(const TrueView& novel, std::span<const TrueView> 
 }
 
 double VisibleCoverage(const TrueView& novel, std::span<const TrueView> sources,
-                       const Mask& coverage, int threads) {
-  const Grid<std::uint8_t> count = CountSeenBy(novel, sources, threads);
+                       const Mask& coverage) {
+  const Grid<std::uint8_t> count = CountSeenBy(novel, sources);
   if (coverage.width() != count.width() || coverage.height() != count.height()) {
     throw Error(fmt::format("visibility: expected coverage of {}x{}, found {}x{}", count.width(),
                             count.height(), coverage.width(), coverage.height()));
@@ -89,9 +88,8 @@ double VisibleCoverage(const TrueView& novel, std::span<const TrueView> sources,
   return visible == 0 ? 1.0 : static_cast<double>(covered) / static_cast<double>(visible);
 }
 
-Mask VisibleMask(const TrueView& view, std::span<const TrueView> others, int min_views,
-                 int threads) {
-  Mask mask = CountSeenBy(view, others, threads);
+Mask VisibleMask(const TrueView& view, std::span<const TrueView> others, int min_views) {
+  Mask mask = CountSeenBy(view, others);
   for (std::uint8_t& value : mask.data()) value = value >= min_views ? 255 : 0;
   return mask;
 }

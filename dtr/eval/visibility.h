@@ -26,17 +26,15 @@ bool Sees(const TrueView& view, const Eigen::Vector3d& p_in_world);
 /// For every pixel of `novel` with true depth: how many of `others` see its surface point (at most
 /// 255). 0 where there is no truth. Does not depend on `threads` (0: all cores).
 /// Throws Error when a depth map is missing or has not its camera's size.
-Grid<std::uint8_t> CountSeenBy(const TrueView& novel, std::span<const TrueView> others,
-                               int threads = 0);
+Grid<std::uint8_t> CountSeenBy(const TrueView& novel, std::span<const TrueView> others);
 
 /// Of the novel pixels whose true surface point some source view sees, the share that `coverage`
 /// (255: the renderer saw it) contains. 1 when no such pixel exists.
 double VisibleCoverage(const TrueView& novel, std::span<const TrueView> sources,
-                       const Mask& coverage, int threads = 0);
+                       const Mask& coverage);
 
 /// 255 where the true surface point is seen in at least `min_views` of `others`.
-Mask VisibleMask(const TrueView& view, std::span<const TrueView> others, int min_views = 2,
-                 int threads = 0);
+Mask VisibleMask(const TrueView& view, std::span<const TrueView> others, int min_views = 2);
 
 /// 255 where the luma (BT.601, of the sRGB values) of the 9x9 pixels around, cut at the border, has
 /// a standard deviation of at least 4 levels.

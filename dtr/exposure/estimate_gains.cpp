@@ -26,9 +26,9 @@ constexpr double kSolved = 1e-6;
 constexpr double kCauchyMedians = 2, kLeastPairSigma = 0.002;  // scale of Cauchy's loss of pairs
 
 std::vector<ExposurePair> ComparePairs(std::span<const SmallView> views,
-                                       std::span<const std::vector<int>> partners, int threads) {
+                                       std::span<const std::vector<int>> partners) {
   std::vector<std::vector<ExposurePair>> of_view(views.size());
-  ParallelFor(0, static_cast<int>(views.size()), threads, [&](int a) {
+  ParallelFor(0, static_cast<int>(views.size()), [&](int a) {
     for (const int b : partners[static_cast<size_t>(a)]) {
       if (const auto pair = CompareExposures(views, a, b))
         of_view[static_cast<size_t>(a)].push_back(*pair);
@@ -132,10 +132,9 @@ SmallView ShrinkForGains(const View& view) {
 }
 
 std::vector<Eigen::Vector3d> EstimateGains(std::span<const SmallView> views,
-                                           std::span<const std::vector<int>> partners,
-                                           int threads) {
+                                           std::span<const std::vector<int>> partners) {
   std::vector<Eigen::Vector3d> gains(views.size(), Eigen::Vector3d::Ones());
-  const std::vector<ExposurePair> pairs = ComparePairs(views, partners, threads);
+  const std::vector<ExposurePair> pairs = ComparePairs(views, partners);
   if (pairs.empty()) return gains;
   const Eigen::MatrixX3d logs = SolveExposures(pairs, static_cast<int>(views.size()));
   if (logs.cwiseAbs().maxCoeff() < kUnnoticed) return gains;

@@ -32,6 +32,6 @@ SmallView ShrinkForGains(const View& view);
 /// indices of others that show the same. All are exactly 1 where none is 2 % or more from it, since
 /// errors of that size do not show. Deterministic for any number of threads.
 std::vector<Eigen::Vector3d> EstimateGains(std::span<const SmallView> views,
-                                           std::span<const std::vector<int>> partners, int threads);
+                                           std::span<const std::vector<int>> partners);
 
 }  // namespace dtr

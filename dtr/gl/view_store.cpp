@@ -149,7 +149,7 @@ void ViewStore::Prepare(const std::vector<const View*>& views, const RenderOptio
   }
   const bool splats = options.primitive == Primitive::kSplat;
   std::vector<ViewMesh> lists(missing.size());
-  ParallelFor(0, static_cast<int>(missing.size()), options.threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(missing.size()), [&](int i) {
     const auto k = static_cast<size_t>(i);
     if (splats) {
       lists[k].points = MakeSplats(*missing[k], options);
@@ -186,7 +186,7 @@ void ViewStore::PrepareDeferred(const std::vector<const View*>& views, const Ren
   }
   std::vector<SampleGrid> grids(missing.size());
   std::vector<StoredDepth> depths(missing.size());
-  ParallelFor(0, static_cast<int>(missing.size()), options.threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(missing.size()), [&](int i) {
     const auto k = static_cast<size_t>(i);
     const View& view = *missing[k];
     grids[k] = MakeSampleGrid(view, options.resolution);

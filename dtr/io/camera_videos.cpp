@@ -63,7 +63,6 @@ void WriteRaw(const fs::path& file, const fs::path& set_folder, const Clip& clip
   FileStream out(file);
   LoadOptions load;
   load.depth = false;
-  load.threads = 1;
   for (const View* view : clip) {
     View loaded = *view;
     LoadPixels(set_folder, loaded, load);
@@ -157,13 +156,12 @@ void RequireVideoEncoder() {
 }
 
 void StoreCameraVideos(const fs::path& set_folder, const fs::path& work_folder, DtrSet& set,
-                       const VideoQuality& quality, int threads, double memory_gb,
-                       Progress& progress) {
+                       const VideoQuality& quality, double memory_gb, Progress& progress) {
   const std::vector<Clip> clips = ClipsOf(set);
   progress.Stage("images as video", static_cast<int>(clips.size()));
   MemoryBudget memory(memory_gb);
   std::atomic<int> done = 0;
-  ParallelFor(0, static_cast<int>(clips.size()), threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(clips.size()), [&](int i) {
     progress.ThrowIfInterrupted();
     const Clip& clip = clips[static_cast<size_t>(i)];
     const PinholeCamera& camera = clip.front()->camera;

@@ -22,8 +22,7 @@ struct VideoQuality {
 /// Throws Error where ffmpeg is missing or fails.
 void StoreCameraVideos(const std::filesystem::path& set_folder,
                        const std::filesystem::path& work_folder, DtrSet& set,
-                       const VideoQuality& quality, int threads, double memory_gb,
-                       Progress& progress);
+                       const VideoQuality& quality, double memory_gb, Progress& progress);
 
 /// "lossless" or a rate factor, as people write them. Throws UsageError for other words.
 VideoQuality VideoQualityFrom(const std::string& word);

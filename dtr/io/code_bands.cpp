@@ -66,13 +66,13 @@ void Join(const CodeParts& parts, const BandRange& band, Grid<std::uint16_t>& co
 
 }  // namespace
 
-std::string EncodeBands(const Grid<std::uint16_t>& codes, int threads) {
+std::string EncodeBands(const Grid<std::uint16_t>& codes) {
   if (codes.empty() || codes.channels() != 1) {
     throw Error("coded depth: expected one channel of 16 bits to write");
   }
   const int bands = BandsOf(codes.height(), kRowsPerBand);
   std::vector<std::vector<std::string>> frames(static_cast<size_t>(bands));
-  ParallelFor(0, bands, threads, [&](int band) {
+  ParallelFor(0, bands, [&](int band) {
     const BandRange range = RangeOfBand(band, kRowsPerBand, codes.height());
     CodeParts parts = SplitCodes(codes, range.first_row, range.rows);
     frames[static_cast<size_t>(band)] = {CompressedPart(parts.validity),
@@ -82,7 +82,7 @@ std::string EncodeBands(const Grid<std::uint16_t>& codes, int threads) {
   return kBandMagic + PackSize(codes.width(), codes.height()) + PackParts(frames);
 }
 
-Grid<std::uint16_t> DecodeBands(std::string_view bytes, int width_px, int height_px, int threads) {
+Grid<std::uint16_t> DecodeBands(std::string_view bytes, int width_px, int height_px) {
   ExpectMagic(bytes, kBandMagic);
   bytes.remove_prefix(kMagicBytes);
   const int rows_per_band = UnpackSize(bytes, width_px, height_px);
@@ -96,7 +96,7 @@ Grid<std::uint16_t> DecodeBands(std::string_view bytes, int width_px, int height
   const CodeParts first =
       DecompressedParts(frames.front(), width_px, RangeOfBand(0, rows_per_band, height_px).rows);
   Grid<std::uint16_t> codes(width_px, height_px);
-  ParallelFor(0, bands, threads, [&](int band) {
+  ParallelFor(0, bands, [&](int band) {
     const BandRange range = RangeOfBand(band, rows_per_band, height_px);
     const BandFrames& of_band = frames[static_cast<size_t>(band)];
     Join(band == 0 ? first : DecompressedParts(of_band, width_px, range.rows), range, codes);

@@ -11,13 +11,12 @@ namespace dtr::io {
 
 /// The bytes of such a file: the same for any number of threads (0: all cores). Code 0 is a hole.
 /// Throws Error unless the grid has one channel and pixels.
-std::string EncodeBands(const Grid<std::uint16_t>& codes, int threads = 1);
+std::string EncodeBands(const Grid<std::uint16_t>& codes);
 
 /// The inverse. The size that the image must have is checked, as are all sizes in the file,
 /// before anything is allocated. Throws Error (without a file's name) for whatever EncodeBands
 /// cannot have written: another size, missing or additional bytes, a checksum that does not hold.
-Grid<std::uint16_t> DecodeBands(std::string_view bytes, int width_px, int height_px,
-                                int threads = 1);
+Grid<std::uint16_t> DecodeBands(std::string_view bytes, int width_px, int height_px);
 
 /// No file of that size is larger.
 std::uint64_t MostBandBytes(int width_px, int height_px);

@@ -130,14 +130,14 @@ void ApplyChanges(const DifferenceParts& parts, const BandRange& band, Grid<std:
 }  // namespace
 
 std::string EncodeDifferences(const Grid<std::uint16_t>& codes, const Grid<std::uint16_t>& base,
-                              const std::string& base_sha256, int threads) {
+                              const std::string& base_sha256) {
   if (codes.empty() || codes.channels() != 1 || base.channels() != 1 ||
       base.width() != codes.width() || base.height() != codes.height()) {
     throw std::invalid_argument("coded differences: expected two images of one size");
   }
   const int bands = BandsOf(codes.height(), kRowsPerBand);
   std::vector<std::vector<std::string>> frames(static_cast<size_t>(bands));
-  ParallelFor(0, bands, threads, [&](int band) {
+  ParallelFor(0, bands, [&](int band) {
     const DifferenceParts parts =
         SplitDifferences(codes, base, RangeOfBand(band, kRowsPerBand, codes.height()));
     frames[static_cast<size_t>(band)] = {
@@ -154,8 +154,7 @@ std::string BaseOfDifferences(std::string_view bytes) {
   return HexOfBytes(bytes.substr(kMagicBytes, kHashBytes));
 }
 
-Grid<std::uint16_t> DecodeDifferences(std::string_view bytes, const Grid<std::uint16_t>& base,
-                                      int threads) {
+Grid<std::uint16_t> DecodeDifferences(std::string_view bytes, const Grid<std::uint16_t>& base) {
   (void)BaseOfDifferences(bytes);  // magic and hash are there
   bytes.remove_prefix(kMagicBytes + kHashBytes);
   const int width_px = base.width(), height_px = base.height();
@@ -167,7 +166,7 @@ Grid<std::uint16_t> DecodeDifferences(std::string_view bytes, const Grid<std::ui
                            RangeOfBand(band, rows_per_band, height_px).rows);
   }
   Grid<std::uint16_t> codes = base;
-  ParallelFor(0, bands, threads, [&](int band) {
+  ParallelFor(0, bands, [&](int band) {
     const BandRange range = RangeOfBand(band, rows_per_band, height_px);
     ApplyChanges(DecompressedChanges(frames[static_cast<size_t>(band)], width_px, range.rows),
                  range, codes);

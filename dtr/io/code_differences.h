@@ -13,7 +13,7 @@ namespace dtr::io {
 /// The bytes of such a file: the same for any number of threads. Code 0 is a hole. `base_sha256`
 /// (64 hexadecimal digits) names the file that `base`, of the same size, is read from.
 std::string EncodeDifferences(const Grid<std::uint16_t>& codes, const Grid<std::uint16_t>& base,
-                              const std::string& base_sha256, int threads = 1);
+                              const std::string& base_sha256);
 
 /// The SHA-256 of the base that a file's codes are differences to. Throws Error where its beginning
 /// is not that of such a file.
@@ -22,8 +22,7 @@ std::string BaseOfDifferences(std::string_view bytes);
 /// The inverse; the image has the size of `base`. All sizes in the file are checked before anything
 /// is allocated. Throws Error (without a file's name) for whatever EncodeDifferences cannot have
 /// written against a base of this size. The caller compares BaseOfDifferences.
-Grid<std::uint16_t> DecodeDifferences(std::string_view bytes, const Grid<std::uint16_t>& base,
-                                      int threads = 1);
+Grid<std::uint16_t> DecodeDifferences(std::string_view bytes, const Grid<std::uint16_t>& base);
 
 /// No file of that size is larger.
 std::uint64_t MostDifferenceBytes(int width_px, int height_px);

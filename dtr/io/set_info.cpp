@@ -12,7 +12,6 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/machine.h"
-#include "dtr/base/parallel_for.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/json_fields.h"
 #include "dtr/io/pruned.h"
@@ -184,7 +183,7 @@ Json HostInfo() {
   return {{"name", names.nodename},
           {"system", std::string(names.sysname) + " " + names.release},
           {"processor", CpuModel()},
-          {"cores", ResolveThreads(0)}};
+          {"cores", Cores()}};
 }
 
 }  // namespace

@@ -34,7 +34,6 @@ struct LoadOptions {
   bool held_out =
       false;  ///< false: held-out views are left out altogether, so no renderer sees one
   bool collapse_duplicates = true;  ///< views of equal camera and content count once
-  int threads = 0;                  ///< 0: all cores
   /// A view that alone takes more, 1e9 bytes, is an error before it is allocated; 0: no bound.
   double memory_gb = kImageMemoryGb;
   /// Told of what is left out of a view that loads all the same; called from any thread.
@@ -63,7 +62,7 @@ std::vector<std::string> CollapseDuplicates(DtrSet& set);
 
 /// Reads the set, hashes every file again and compares. Returns one line per problem, empty when
 /// all is well; does not throw for a damaged set.
-std::vector<std::string> VerifySet(const std::filesystem::path& set_folder, int threads = 0);
+std::vector<std::string> VerifySet(const std::filesystem::path& set_folder);
 
 /// Unique ids, safe as file names on every system, from photo names: the name without extension,
 /// other characters than letters, digits, '.', '_', '-' replaced by '_'; where two would be equal

@@ -237,7 +237,7 @@ DtrSet LoadSet(const fs::path& set_folder, const LoadOptions& options) {
     for (View& view : frame.views) views.push_back(&view);
   }
   RequireMemoryForAll(set_folder, views, options);
-  ParallelFor(0, static_cast<int>(views.size()), options.threads,
+  ParallelFor(0, static_cast<int>(views.size()),
               [&](int i) { LoadPixels(set_folder, *views[static_cast<size_t>(i)], options); });
   return set;
 }
@@ -277,7 +277,7 @@ std::vector<std::string> CollapseDuplicates(DtrSet& set) {
   return removed;
 }
 
-std::vector<std::string> VerifySet(const fs::path& set_folder, int threads) {
+std::vector<std::string> VerifySet(const fs::path& set_folder) {
   DtrSet set;
   try {
     set = ReadSetFile(set_folder);
@@ -286,7 +286,7 @@ std::vector<std::string> VerifySet(const fs::path& set_folder, int threads) {
   }
   const std::vector<NamedFile> files = FilesOf(set);
   std::vector<std::string> found(files.size());
-  ParallelFor(0, static_cast<int>(files.size()), threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(files.size()), [&](int i) {
     const NamedFile& named = files[static_cast<size_t>(i)];
     std::string& problem = found[static_cast<size_t>(i)];
     try {

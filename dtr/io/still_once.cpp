@@ -198,13 +198,12 @@ void StoreOnce(const fs::path& set_folder, const CameraOverTime& camera) {
 
 }  // namespace
 
-void StoreStillOnce(const fs::path& set_folder, DtrSet& set, int threads, double memory_gb,
-                    Progress& progress) {
+void StoreStillOnce(const fs::path& set_folder, DtrSet& set, double memory_gb, Progress& progress) {
   MemoryBudget memory(memory_gb);
   const std::vector<CameraOverTime> cameras = CamerasOf(set);
   progress.Stage("what stands still, once", static_cast<int>(cameras.size()));
   std::atomic<int> done = 0;
-  ParallelFor(0, static_cast<int>(cameras.size()), threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(cameras.size()), [&](int i) {
     progress.ThrowIfInterrupted();
     const CameraOverTime& camera = cameras[static_cast<size_t>(i)];
     const PinholeCamera grid = camera.views.front()->DepthCamera();

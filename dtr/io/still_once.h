@@ -15,7 +15,7 @@ namespace dtr::io {
 /// stored again are taken away. Files of before stay where they are; those of differences have
 /// names of their own. Cameras in memory at a time take at most `memory_gb` (GB of 1e9 bytes). The
 /// same bytes for any number of threads. Throws Error as LoadPixels.
-void StoreStillOnce(const std::filesystem::path& set_folder, DtrSet& set, int threads,
-                    double memory_gb, Progress& progress);
+void StoreStillOnce(const std::filesystem::path& set_folder, DtrSet& set, double memory_gb,
+                    Progress& progress);
 
 }  // namespace dtr::io

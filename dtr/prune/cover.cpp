@@ -172,13 +172,13 @@ TileGrid TileGridOf(const View& view) {
   return grid;
 }
 
-CoverMap WhoCovers(const DtrSet& set, const std::vector<std::string>& without, int threads) {
+CoverMap WhoCovers(const DtrSet& set, const std::vector<std::string>& without) {
   const RenderScene scene = MakeRenderScene(set, without);
   std::vector<TileGrid> grids;
   for (const View* view : scene.views) grids.push_back(TileGridOf(*view));
   CoverMap map;
   map.views.resize(scene.views.size());
-  ParallelFor(0, static_cast<int>(scene.views.size()), threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(scene.views.size()), [&](int i) {
     const auto k = static_cast<size_t>(i);
     map.views[k] = PlaceFinder(scene.views, grids, i).Find(grids[k]);
   });

@@ -52,6 +52,6 @@ struct CoverMap {
 };
 
 /// `set`: loaded, a still scene; views in `without` (ids) are not there.
-CoverMap WhoCovers(const DtrSet& set, const std::vector<std::string>& without, int threads);
+CoverMap WhoCovers(const DtrSet& set, const std::vector<std::string>& without);
 
 }  // namespace dtr::prune

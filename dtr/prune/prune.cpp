@@ -56,7 +56,7 @@ class Pruner {
       : set_(set),
         options_(options),
         progress_(progress),
-        mover_(set, options.render.threads),
+        mover_(set),
         measurer_(set,
                   {options.probes, options.checks, options.probe_crop, options.seed,
                    options.other_bytes, options.render},

@@ -137,7 +137,7 @@ std::optional<Setting> Mover::After(Setting setting, const Move& move) {
 
 const CoverMap& Mover::CoverWithout(const std::vector<std::string>& without) {
   if (!cover_ || cover_without_ != without) {
-    cover_ = WhoCovers(set_, without, threads_);
+    cover_ = WhoCovers(set_, without);
     cover_without_ = without;
   }
   return *cover_;

@@ -43,7 +43,7 @@ struct Move {
 class Mover {
  public:
   /// `set`: loaded, must outlive this.
-  Mover(const DtrSet& set, int threads) : set_(set), threads_(threads) {}
+  explicit Mover(const DtrSet& set) : set_(set) {}
 
   /// The setting after a move; nothing where it changes nothing or goes back.
   std::optional<Setting> After(Setting setting, const Move& move);
@@ -61,7 +61,6 @@ class Mover {
   const CoverMap& CoverWithout(const std::vector<std::string>& without);
 
   const DtrSet& set_;
-  int threads_;
   std::optional<CoverMap> cover_;
   std::vector<std::string> cover_without_;
 };

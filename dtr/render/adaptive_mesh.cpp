@@ -296,8 +296,7 @@ AdaptiveMesh MakeAdaptiveMesh(const SampleGrid& samples, const BreakRule& rule,
   return MeshMaker(samples, rule, cover).Make();
 }
 
-AdaptiveMesh MakeAdaptiveMesh(const View& view, const RenderOptions& options, int threads,
-                              std::string& unfit) {
+AdaptiveMesh MakeAdaptiveMesh(const View& view, const RenderOptions& options, std::string& unfit) {
   unfit.clear();
   const SampleGrid samples = MakeSampleGrid(view, options.resolution);
   const MeshRule rule = MeshRuleOf(view, options);
@@ -312,10 +311,10 @@ AdaptiveMesh MakeAdaptiveMesh(const View& view, const RenderOptions& options, in
     }
   }
   return MakeAdaptiveMesh(samples, rule.breaks,
-                          CoverBlocks(samples.inverse_depth, rule.breaks, rule.tolerance, threads));
+                          CoverBlocks(samples.inverse_depth, rule.breaks, rule.tolerance));
 }
 
-StoredMesh MakeStoredMesh(const View& view, const RenderOptions& options, int threads) {
+StoredMesh MakeStoredMesh(const View& view, const RenderOptions& options) {
   const SampleGrid samples = MakeSampleGrid(view, options.resolution);
   const MeshRule rule = MeshRuleOf(view, options);
   return {"",
@@ -324,7 +323,7 @@ StoredMesh MakeStoredMesh(const View& view, const RenderOptions& options, int th
           rule.tolerance,
           rule.breaks.inverse_depth,
           rule.breaks.absolute_depth,
-          CoverBlocks(samples.inverse_depth, rule.breaks, rule.tolerance, threads)};
+          CoverBlocks(samples.inverse_depth, rule.breaks, rule.tolerance)};
 }
 
 }  // namespace dtr

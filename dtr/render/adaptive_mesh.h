@@ -71,10 +71,9 @@ AdaptiveMesh MakeAdaptiveMesh(const SampleGrid& samples, const BreakRule& rule,
 /// Of the view's depth with these options. The view's stored cover serves where it is of this rule
 /// and resolution; else one is made, on `threads` as ParallelFor. The mesh is the same either way.
 /// A stored cover that does not fit the depth map is left out, too, and `unfit` says why ("" else).
-AdaptiveMesh MakeAdaptiveMesh(const View& view, const RenderOptions& options, int threads,
-                              std::string& unfit);
+AdaptiveMesh MakeAdaptiveMesh(const View& view, const RenderOptions& options, std::string& unfit);
 
 /// What a set keeps of it; the hashes are the writer's to fill in.
-StoredMesh MakeStoredMesh(const View& view, const RenderOptions& options, int threads);
+StoredMesh MakeStoredMesh(const View& view, const RenderOptions& options);
 
 }  // namespace dtr

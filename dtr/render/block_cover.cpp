@@ -165,13 +165,12 @@ bool SplitsAlongBC(double a, double b, double c, double d) {
   return std::abs(b - c) < std::abs(a - d);
 }
 
-BlockCover CoverBlocks(const Grid<double>& inverse_depth, const BreakRule& rule, double tolerance,
-                       int threads) {
+BlockCover CoverBlocks(const Grid<double>& inverse_depth, const BreakRule& rule, double tolerance) {
   BlockCover cover;
   cover.columns = inverse_depth.width();
   cover.rows = inverse_depth.height();
   std::vector<BlockCover> parts(static_cast<size_t>((cover.rows + kRootSide - 1) / kRootSide));
-  ParallelFor(0, static_cast<int>(parts.size()), threads, [&](int r) {
+  ParallelFor(0, static_cast<int>(parts.size()), [&](int r) {
     for (int x = 0; x < cover.columns; x += kRootSide) {
       RootMaker(inverse_depth, rule, tolerance, x, r * kRootSide, parts[static_cast<size_t>(r)])
           .Make();

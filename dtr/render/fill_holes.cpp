@@ -23,17 +23,17 @@ Grid<float> SeenDepth(const RenderResult& result) {
   return seen;
 }
 
-Grid<float> FillHoles(RenderResult& result, int threads) {
+Grid<float> FillHoles(RenderResult& result) {
   using Cell = PushPull::Cell;
   Grid<float> depth = SeenDepth(result);
   const std::array<double, 256>& linear = LinearFromSrgb8();
-  const PushPull surroundings(HolePyramid(HolesOf(depth)), threads, [&](int x, int y) {
+  const PushPull surroundings(HolePyramid(HolesOf(depth)), [&](int x, int y) {
     const double z = depth(x, y);
     if (!(z > 0)) return Cell{};
     const std::uint8_t* rgb = &result.image(x, y);
     return Cell{1, {linear[rgb[0]], linear[rgb[1]], linear[rgb[2]], 1 / z}};
   });
-  ParallelFor(0, depth.height(), threads, [&](int y) {
+  ParallelFor(0, depth.height(), [&](int y) {
     for (int x = 0; x < depth.width(); ++x) {
       if (result.coverage(x, y) != 0) continue;
       const Cell cell = surroundings.At(x, y);

@@ -14,6 +14,6 @@ Grid<float> SeenDepth(const RenderResult& result);
 /// covered pixel stays black.
 /// Returns where what the image shows now lies, for hosts that hide other things by it: plane z,
 /// seen or filled; 0 where it is still empty.
-Grid<float> FillHoles(RenderResult& result, int threads = 1);
+Grid<float> FillHoles(RenderResult& result);
 
 }  // namespace dtr

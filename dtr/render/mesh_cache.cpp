@@ -24,11 +24,9 @@ void MeshCache::Prepare(const std::vector<const View*>& views, const RenderOptio
   }
   std::vector<AdaptiveMesh> meshes(missing.size());
   std::vector<std::string> unfit(missing.size());
-  // One view alone has all cores; of several each has one.
-  const int threads_each = missing.size() > 1 ? 1 : options.threads;
-  ParallelFor(0, static_cast<int>(missing.size()), options.threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(missing.size()), [&](int i) {
     const auto k = static_cast<size_t>(i);
-    meshes[k] = MakeAdaptiveMesh(*missing[k], options, threads_each, unfit[k]);
+    meshes[k] = MakeAdaptiveMesh(*missing[k], options, unfit[k]);
   });
   for (size_t k = 0; k < missing.size(); ++k) {
     if (unfit[k].empty()) continue;

@@ -48,7 +48,6 @@ struct RenderOptions {
   bool blend_in_linear_light = false;  ///< else in sRGB values
   bool fill_holes = false;             ///< SPEC 7, a separate step; never counted as seen
   bool smooth_edges = false;           ///< SPEC 8, a separate step
-  int threads = 0;                     ///< 0: all cores; the result does not depend on it
   bool operator==(const RenderOptions&) const = default;
 };
 

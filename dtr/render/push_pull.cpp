@@ -14,8 +14,8 @@ using Level = Grid<Cell>;
 constexpr int kRowsWorthThreads = 64;
 
 template <typename Row>
-void ForRows(const Level& level, int threads, const Row& row) {
-  ParallelFor(0, level.height(), level.height() < kRowsWorthThreads ? 1 : threads, row);
+void ForRows(const Level& level, const Row& row) {
+  ParallelFor(0, level.height(), level.height() < kRowsWorthThreads ? 1 : level.height(), row);
 }
 
 /// Sums the cells that are known.
@@ -40,9 +40,9 @@ class Mean {
 
 /// Pull: each needed coarse cell is the mean of its up to four children.
 template <typename Finer>
-Level Coarser(const Mask& needed, int width, int height, int threads, const Finer& finer) {
+Level Coarser(const Mask& needed, int width, int height, const Finer& finer) {
   Level coarse(needed.width(), needed.height());
-  ForRows(coarse, threads, [&](int y) {
+  ForRows(coarse, [&](int y) {
     for (int x = 0; x < coarse.width(); ++x) {
       if (needed(x, y) == 0) continue;
       Mean mean;
@@ -142,16 +142,14 @@ HolePyramid::HolePyramid(const Mask& hole) : width_(hole.width()), height_(hole.
   }
 }
 
-PushPull::PushPull(const HolePyramid& holes, int threads,
-                   const std::function<Cell(int x, int y)>& finest) {
+PushPull::PushPull(const HolePyramid& holes, const std::function<Cell(int x, int y)>& finest) {
   int width = holes.width(), height = holes.height();
   for (const Mask& needed : holes.needed()) {
     if (levels_.empty()) {
-      levels_.push_back(Coarser(needed, width, height, threads, finest));
+      levels_.push_back(Coarser(needed, width, height, finest));
     } else {
       const Level& fine = levels_.back();
-      levels_.push_back(
-          Coarser(needed, width, height, threads, [&](int x, int y) { return fine(x, y); }));
+      levels_.push_back(Coarser(needed, width, height, [&](int x, int y) { return fine(x, y); }));
     }
     width = needed.width(), height = needed.height();
   }
@@ -159,7 +157,7 @@ PushPull::PushPull(const HolePyramid& holes, int threads,
     const Level& coarse = levels_[level];
     const Mask& needed = holes.needed()[level - 1];
     Level& fine = levels_[level - 1];
-    ForRows(fine, threads, [&](int y) {
+    ForRows(fine, [&](int y) {
       for (int x = 0; x < fine.width(); ++x) {
         if (needed(x, y) != 0 && !(fine(x, y).weight > 0)) fine(x, y) = Between(coarse, x, y);
       }

@@ -37,7 +37,7 @@ class PushPull {
   };
 
   /// `finest(x, y)` is the Cell of a pixel: weight 1 where it is known, else 0.
-  PushPull(const HolePyramid& holes, int threads, const std::function<Cell(int x, int y)>& finest);
+  PushPull(const HolePyramid& holes, const std::function<Cell(int x, int y)>& finest);
 
   /// What a hole takes; weight 0 when the image has no known pixel.
   Cell At(int x, int y) const;

@@ -210,10 +210,10 @@ class EdgeSmoother {
 }  // namespace
 
 void SmoothEdges(const PinholeCamera& novel, std::span<const Eigen::Vector3d> view_centres,
-                 bool holes_are_filled, int threads, RenderResult& result) {
+                 bool holes_are_filled, RenderResult& result) {
   EdgeSmoother smoother(novel, view_centres, holes_are_filled, result);
   const int height = result.image.height(), pieces = (height + kRowsTogether - 1) / kRowsTogether;
-  ParallelFor(0, pieces, threads, [&](int piece) {
+  ParallelFor(0, pieces, [&](int piece) {
     const int first = piece * kRowsTogether;
     smoother.SmoothRows(first, std::min(first + kRowsTogether, height));
   });

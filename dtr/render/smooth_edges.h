@@ -15,6 +15,6 @@ namespace dtr {
 /// touched. `view_centres`: of the views in use, in the novel camera's frame, scene units.
 /// The result does not depend on `threads` (0: as ParallelFor).
 void SmoothEdges(const PinholeCamera& novel, std::span<const Eigen::Vector3d> view_centres,
-                 bool holes_are_filled, int threads, RenderResult& result);
+                 bool holes_are_filled, RenderResult& result);
 
 }  // namespace dtr

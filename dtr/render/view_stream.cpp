@@ -55,9 +55,9 @@ class ViewStream::Readers {
     std::string error;  ///< empty: read
   };
 
-  Readers(Loader load, int threads) : load_(std::move(load)) {
+  Readers(Loader load, int count) : load_(std::move(load)) {
     try {
-      for (int i = 0; i < threads; ++i) {
+      for (int i = 0; i < count; ++i) {
         threads_.emplace_back([this](const std::stop_token& stop) { Run(stop); });
       }
     } catch (const std::system_error&) {
@@ -83,6 +83,7 @@ class ViewStream::Readers {
 
  private:
   void Run(const std::stop_token& stop) {
+    const ThreadLimit one(1);  // a view by each reader
     for (;;) {
       std::optional<Result> request;
       {
@@ -135,7 +136,7 @@ ViewStream::ViewStream(DtrSet& set, std::vector<RenderScene> described, Loader l
     }
   }
   first_slot_.push_back(slots_.size());
-  readers_ = std::make_unique<Readers>(std::move(load), ResolveThreads(settings_.threads));
+  readers_ = std::make_unique<Readers>(std::move(load), ThreadLimit::Current());
 }
 
 ViewStream::~ViewStream() = default;

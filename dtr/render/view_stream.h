@@ -32,7 +32,6 @@ class ViewStream {
 
   struct Settings {
     size_t host_bytes = 4'000'000'000;  ///< pixels in memory; one view is always kept
-    int threads = 0;                    ///< that read; 0: all cores
     std::function<void(const std::string&)> warn = [](const std::string&) {};
   };
 

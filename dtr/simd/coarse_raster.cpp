@@ -12,17 +12,16 @@ constexpr int kMinRows = 64;
 
 }  // namespace
 
-void CoarseRaster::Draw(const std::vector<PlacedMesh>& meshes, int width_px, const Band& band,
-                        int threads) {
+void CoarseRaster::Draw(const std::vector<PlacedMesh>& meshes, int width_px, const Band& band) {
   points_.resize(meshes.size());
-  ParallelFor(0, static_cast<int>(meshes.size()), threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(meshes.size()), [&](int i) {
     const auto k = static_cast<size_t>(i);
     ProjectVertices(*meshes[k].mesh, meshes[k].placement, points_[k]);
   });
   nearest_.assign(static_cast<size_t>(width_px) * static_cast<size_t>(band.count), 0);
   const int most = std::max(1, band.count / kMinRows);
-  const int strips = std::min(most, ResolveThreads(threads));
-  ParallelFor(0, strips, threads, [&](int s) {
+  const int strips = std::min(most, ThreadLimit::Current());
+  ParallelFor(0, strips, [&](int s) {
     const int from = static_cast<int>(static_cast<long long>(band.count) * s / strips);
     const int to = static_cast<int>(static_cast<long long>(band.count) * (s + 1) / strips);
     const CoarseStrip strip{

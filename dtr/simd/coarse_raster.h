@@ -21,7 +21,7 @@ class CoarseRaster {
  public:
   /// The nearest surface of all meshes in the band's pixels; `threads` as ParallelFor, the result
   /// does not depend on it.
-  void Draw(const std::vector<PlacedMesh>& meshes, int width_px, const Band& band, int threads);
+  void Draw(const std::vector<PlacedMesh>& meshes, int width_px, const Band& band);
 
   /// Inverse depth in the novel camera, 0 where nothing is; the band's first row first.
   const std::vector<float>& nearest() const { return nearest_; }

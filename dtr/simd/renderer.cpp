@@ -147,7 +147,7 @@ class Renderer::Implementation {
       const AdaptiveMesh& mesh = views_.meshes().MeshOf(*frame.views[i]);
       placed.push_back({&mesh, PlaceGrid(*frame.views[i], mesh, frame.placements[i], frame.novel)});
     }
-    surface_.Draw(placed, frame.novel.width_px(), band, frame.options.threads);
+    surface_.Draw(placed, frame.novel.width_px(), band);
   }
 
   /// True when frames like this one, once drawn, need no pixels of their views any more.

@@ -136,7 +136,7 @@ void Resolver::Draw(const RenderFrame& frame, const Band& band, const SampledVie
   const PixelRow any_row = RowOf(frame, linear.data());
   // A thread's rows lie together: they read the same pixels of the views.
   const int pieces = (band.count + kRowsTogether - 1) / kRowsTogether;
-  ParallelFor(0, pieces, frame.options.threads, [&](int piece) {
+  ParallelFor(0, pieces, [&](int piece) {
     const int end = std::min((piece + 1) * kRowsTogether, band.count);
     for (int y = piece * kRowsTogether; y < end; ++y) {
       const size_t first = static_cast<size_t>(y) * width;

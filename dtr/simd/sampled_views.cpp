@@ -136,7 +136,7 @@ void SampledViews::Prepare(const std::vector<const View*>& views, const RenderOp
     missing.push_back(&stored);
     missing_views.push_back(view);
   }
-  ParallelFor(0, static_cast<int>(missing.size()), options.threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(missing.size()), [&](int i) {
     const auto k = static_cast<size_t>(i);
     missing[k]->sampled = Sample(*missing_views[k], missing[k]->resolution, missing[k]->breaks);
   });

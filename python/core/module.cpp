@@ -6,6 +6,7 @@
 #include <pybind11/stl/filesystem.h>
 
 #include "dtr/base/error.h"
+#include "dtr/base/parallel_for.h"
 #include "dtr/io/formats/pose_from_matrix.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/pruned.h"
@@ -210,11 +211,14 @@ void LoadPixels(Set& set, const std::vector<std::string>& planes, int threads, p
     if (plane == "sigma") wanted.push_back(Plane::kSigma);
   }
   Caller caller(std::move(progress), std::move(note));
-  RunFor(caller, [&](Progress& to_caller) { set.open.Load(wanted, threads, to_caller); });
+  RunFor(caller, [&](Progress& to_caller) {
+    const ThreadLimit limit(threads);
+    set.open.Load(wanted, to_caller);
+  });
 }
 
 /// The set's own options of rendering with those of `json`, an object of RenderOptions' fields.
-RenderOptions OptionsFrom(const DtrSet& set, const std::string& json, int threads) {
+RenderOptions OptionsFrom(const DtrSet& set, const std::string& json) {
   const io::StoredRenderOptions stored = io::RenderOptionsOf(set);
   RenderOptions options = WithStoredOptions(WholeFrames(), stored.json, stored.where);
   try {
@@ -222,13 +226,12 @@ RenderOptions OptionsFrom(const DtrSet& set, const std::string& json, int thread
   } catch (const Error& error) {
     throw UsageError(error.what());
   }
-  options.threads = threads;
   return options;
 }
 
 py::dict RenderImage(Set& set, const NovelFrame& camera, const std::string& options_json,
                      const RenderSettings& settings, py::object note) {
-  const RenderOptions options = OptionsFrom(set.open.set(), options_json, settings.threads);
+  const RenderOptions options = OptionsFrom(set.open.set(), options_json);
   Caller caller(py::none(), std::move(note));
   Rendered rendered;
   try {

@@ -87,7 +87,7 @@ Floats OpenSet::FloatsOf(ViewPlace at, Plane plane) {
   return cell.pixels;
 }
 
-void OpenSet::Load(std::vector<Plane> planes, int threads, Progress& progress) {
+void OpenSet::Load(std::vector<Plane> planes, Progress& progress) {
   // With completed depth comes the measured one.
   std::stable_partition(planes.begin(), planes.end(),
                         [](Plane plane) { return plane == Plane::kCompletedDepth; });
@@ -97,7 +97,7 @@ void OpenSet::Load(std::vector<Plane> planes, int threads, Progress& progress) {
   }
   progress.Stage("reading pixels", static_cast<int>(places.size()));
   std::atomic<int> done = 0;
-  ParallelFor(0, static_cast<int>(places.size()), threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(places.size()), [&](int i) {
     progress.ThrowIfInterrupted();
     for (const Plane plane : planes) {
       const ViewPlace at = places[static_cast<size_t>(i)];

@@ -46,9 +46,9 @@ class OpenSet {
   /// kDepth, kCompletedDepth or kSigma.
   Floats FloatsOf(ViewPlace at, Plane plane);
 
-  /// Reads these planes of every view that are not there yet, on `threads` threads (0: all cores).
+  /// Reads these planes of every view that are not there yet.
   /// Throws Interrupted where `progress` asks for it.
-  void Load(std::vector<Plane> planes, int threads, Progress& progress);
+  void Load(std::vector<Plane> planes, Progress& progress);
 
   /// Forgets all pixels; those that somebody else still has stay with them.
   void DropPixels();

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "dtr/base/error.h"
+#include "dtr/base/parallel_for.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/scene.h"
 #include "dtr/render/time_steps.h"
@@ -81,6 +82,7 @@ class RenderSession {
 
  private:
   void Work(const std::stop_token& stop) {
+    const ThreadLimit limit(settings_.threads);
     for (;;) {
       std::packaged_task<Rendered()> task;
       {
@@ -103,8 +105,7 @@ class RenderSession {
     io::CollapseDuplicates(step_);
     draw_ = cli::MakeRenderer(choice_, console_);
     stream_ = pipeline::StreamOf(folder_, step_, {DescribeRenderScene(step_, excluded)},
-                                 {settings_.memory_gb, settings_.threads, settings_.measured_only},
-                                 console_);
+                                 {settings_.memory_gb, settings_.measured_only}, console_);
   }
 
   Rendered Draw(const pipeline::NovelFrame& camera, const RenderOptions& options) {

@@ -33,13 +33,13 @@ Around AroundOf(std::span<const CellView> views, const std::vector<int>& neighbo
 }  // namespace
 
 std::vector<ScenePlane> PlanesToChoose(std::span<const CellView> views,
-                                       std::span<const std::vector<int>> neighbours, int threads) {
-  std::vector<ScenePlane> planes = FindScenePlanes(views, kMeasuredPlanes, threads);
+                                       std::span<const std::vector<int>> neighbours) {
+  std::vector<ScenePlane> planes = FindScenePlanes(views, kMeasuredPlanes);
   std::vector<Neighbourhood> around;
   for (size_t i = 0; i < views.size(); ++i) {
     around.push_back({&views[i], AroundOf(views, neighbours[i], {}).cells});
   }
-  const auto swept = SweepScenePlanes(around, planes, kSweptPlanes, threads);
+  const auto swept = SweepScenePlanes(around, planes, kSweptPlanes);
   planes.resize(std::min<size_t>(planes.size(), kLargestPlanes));
   planes.insert(planes.end(), swept.begin(), swept.end());
   return planes;
@@ -47,15 +47,14 @@ std::vector<ScenePlane> PlanesToChoose(std::span<const CellView> views,
 
 std::vector<CompletedCells> CompleteCells(std::span<const CellView> views,
                                           std::span<const std::vector<int>> neighbours,
-                                          std::span<const ScenePlane> planes, int threads,
-                                          Progress& progress) {
+                                          std::span<const ScenePlane> planes, Progress& progress) {
   const int count = static_cast<int>(views.size());
   progress.Stage("completion", kPasses * count);
   std::atomic<int> done = 0;
   std::vector<CompletedCells> completed;
   for (int pass = 0; pass < kPasses; ++pass) {
     std::vector<CompletedCells> next(views.size());
-    ParallelFor(0, count, threads, [&](int i) {
+    ParallelFor(0, count, [&](int i) {
       progress.ThrowIfInterrupted();
       const auto v = static_cast<size_t>(i);
       const Around around = AroundOf(views, neighbours[v], completed);
@@ -67,7 +66,7 @@ std::vector<CompletedCells> CompleteCells(std::span<const CellView> views,
   return completed;
 }
 
-std::uint64_t CompletionBytes(std::span<const PinholeCamera> cameras, int threads) {
+std::uint64_t CompletionBytes(std::span<const PinholeCamera> cameras) {
   constexpr std::uint64_t kLabels = kOwnLabels + kLargestPlanes + kSweptPlanes;
   std::uint64_t bytes = 0, largest = 0;
   for (const PinholeCamera& camera : cameras) {
@@ -76,7 +75,7 @@ std::uint64_t CompletionBytes(std::span<const PinholeCamera> cameras, int thread
     largest = std::max(largest, cells);
   }
   // Of each label a plane and two costs: 20 bytes, where a cell has 30.
-  return bytes + static_cast<std::uint64_t>(ResolveThreads(threads)) * largest * kLabels;
+  return bytes + static_cast<std::uint64_t>(ThreadLimit::Current()) * largest * kLabels;
 }
 
 }  // namespace dtr::stereo

@@ -15,7 +15,7 @@ namespace dtr::stereo {
 /// 11.1): the largest measured ones, and those that a sweep finds. `neighbours`: of each view,
 /// indices of others, best first. Deterministic for any number of threads.
 std::vector<ScenePlane> PlanesToChoose(std::span<const CellView> views,
-                                       std::span<const std::vector<int>> neighbours, int threads);
+                                       std::span<const std::vector<int>> neighbours);
 
 /// Planes for all cells of all views (docs/METHODS.md, 11.1): measured surfaces that go on, those
 /// of other views, `planes` of the scene, or infinitely far, whichever the photos agree on, in two
@@ -23,10 +23,9 @@ std::vector<ScenePlane> PlanesToChoose(std::span<const CellView> views,
 /// Deterministic for any number of threads. Throws Interrupted between views.
 std::vector<CompletedCells> CompleteCells(std::span<const CellView> views,
                                           std::span<const std::vector<int>> neighbours,
-                                          std::span<const ScenePlane> planes, int threads,
-                                          Progress& progress);
+                                          std::span<const ScenePlane> planes, Progress& progress);
 
 /// Bytes that CompleteCells takes at most for views of these cameras, their cells included.
-std::uint64_t CompletionBytes(std::span<const PinholeCamera> cameras, int threads);
+std::uint64_t CompletionBytes(std::span<const PinholeCamera> cameras);
 
 }  // namespace dtr::stereo

@@ -95,7 +95,7 @@ std::optional<ViewPlane> ScenePlane::Before(const Pose& cam_from_world) const {
   return plane;
 }
 
-std::vector<ScenePlane> FindScenePlanes(std::span<const CellView> views, int most, int threads) {
+std::vector<ScenePlane> FindScenePlanes(std::span<const CellView> views, int most) {
   std::vector<Sample> samples = SamplesOf(views);
   const double least = kMinShare * static_cast<double>(samples.size()) + 3;
   std::vector<ScenePlane> planes;
@@ -103,7 +103,7 @@ std::vector<ScenePlane> FindScenePlanes(std::span<const CellView> views, int mos
     if (static_cast<double>(samples.size()) <= least) break;
     std::vector<ScenePlane> tried(kTrials);
     std::vector<double> support(kTrials);
-    ParallelFor(0, kTrials, threads, [&](int trial) {
+    ParallelFor(0, kTrials, [&](int trial) {
       const auto t = static_cast<size_t>(trial);
       const Sample& s = samples[HashOf(1, static_cast<std::uint64_t>(k), t) % samples.size()];
       tried[t] = {s.normal, s.normal.dot(s.point)};

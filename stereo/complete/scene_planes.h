@@ -22,7 +22,7 @@ struct ScenePlane {
 /// after the other, each the one of most support among those through single measured cells with
 /// their normals (RANSAC, Fischler and Bolles 1981), fitted to its support. Equal inputs give equal
 /// planes, for any number of threads.
-std::vector<ScenePlane> FindScenePlanes(std::span<const CellView> views, int most, int threads);
+std::vector<ScenePlane> FindScenePlanes(std::span<const CellView> views, int most);
 
 /// A view with those around it.
 struct Neighbourhood {
@@ -35,6 +35,6 @@ struct Neighbourhood {
 /// space-sweep approach to true multi-image matching, CVPR 1996; only its textured parts say
 /// anything), and one after the other the one is chosen that explains most, at most `most`.
 std::vector<ScenePlane> SweepScenePlanes(std::span<const Neighbourhood> views,
-                                         std::span<const ScenePlane> known, int most, int threads);
+                                         std::span<const ScenePlane> known, int most);
 
 }  // namespace dtr::stereo

@@ -45,7 +45,7 @@ bool HasTexture(const CellView& view, int x, int y) {
 
 class Sweep {
  public:
-  Sweep(std::span<const Neighbourhood> views, int threads) : views_(views), threads_(threads) {
+  Sweep(std::span<const Neighbourhood> views) : views_(views) {
     for (const Neighbourhood& around : views) {
       agreements_.emplace_back(*around.view, around.others, std::span<const Grid<float>* const>(),
                                weights_);
@@ -95,7 +95,7 @@ class Sweep {
   /// The plane of most gain, and that.
   std::pair<ScenePlane, double> Best(const std::vector<ScenePlane>& planes) const {
     std::vector<double> gains(planes.size());
-    ParallelFor(0, static_cast<int>(planes.size()), threads_, [&](int i) {
+    ParallelFor(0, static_cast<int>(planes.size()), [&](int i) {
       gains[static_cast<size_t>(i)] = GainOf(planes[static_cast<size_t>(i)]);
     });
     const auto best = std::max_element(gains.begin(), gains.end()) - gains.begin();
@@ -110,7 +110,6 @@ class Sweep {
   }
 
   std::span<const Neighbourhood> views_;
-  const int threads_;
   AgreementWeights weights_;
   std::vector<Agreement> agreements_;
   std::vector<Place> places_;
@@ -176,8 +175,8 @@ std::pair<ScenePlane, double> Refined(const Sweep& sweep, ScenePlane plane) {
 }  // namespace
 
 std::vector<ScenePlane> SweepScenePlanes(std::span<const Neighbourhood> views,
-                                         std::span<const ScenePlane> known, int most, int threads) {
-  Sweep sweep(views, threads);
+                                         std::span<const ScenePlane> known, int most) {
+  Sweep sweep(views);
   if (sweep.places() == 0) return {};
   std::vector<Eigen::Vector3d> normals = {LevelNormal(views, known)};
   for (const ScenePlane& plane : known) {

@@ -1,15 +1,14 @@
 #include "stereo/patchmatch/expected.h"
-
 #include "dtr/base/parallel_for.h"
 
 namespace dtr::stereo::patchmatch {
 
 Expected ExpectedOf(const Level& level, const PriorPlanes& planes, const RelativeNoise& noise,
-                    const DepthRange& range, int threads) {
+                    const DepthRange& range) {
   const int width = level.reference.width, height = level.reference.height;
   const BorderedGrid none(width, height, 0);
   Expected expected{none, none, none, none};
-  ParallelFor(0, height, threads, [&](int y) {
+  ParallelFor(0, height, [&](int y) {
     for (int x = 0; x < width; ++x) {
       const auto plane = planes.At({(x + 0.5) / width, (y + 0.5) / height});
       if (!plane) continue;

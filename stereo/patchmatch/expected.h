@@ -10,6 +10,6 @@ namespace dtr::stereo::patchmatch {
 /// prior have a plane to try and no certainty; those without depth, or with one out of the range,
 /// have neither.
 Expected ExpectedOf(const Level& level, const PriorPlanes& planes, const RelativeNoise& noise,
-                    const DepthRange& range, int threads);
+                    const DepthRange& range);
 
 }  // namespace dtr::stereo::patchmatch

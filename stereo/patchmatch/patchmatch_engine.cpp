@@ -78,8 +78,8 @@ double RangePx(const StereoView& view, const StereoView& other, const DepthRange
 /// The neighbours with a baseline, as pyramids.
 std::vector<SourcePyramid> MakeSources(std::span<const StereoView> views, int reference,
                                        std::span<const int> neighbours, const DepthRange& range,
-                                       std::span<const PlaneMap* const> maps, int most, int levels,
-                                       int threads) {
+                                       std::span<const PlaneMap* const> maps, int most,
+                                       int levels) {
   std::vector<int> usable;
   for (const int n : neighbours) {
     const StereoView& other = views[static_cast<size_t>(n)];
@@ -93,7 +93,7 @@ std::vector<SourcePyramid> MakeSources(std::span<const StereoView> views, int re
                        std::to_string(neighbours.size()) + " neighbours has a baseline");
   }
   std::vector<SourcePyramid> sources(usable.size());
-  ParallelFor(0, static_cast<int>(usable.size()), threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(usable.size()), [&](int i) {
     const auto k = static_cast<size_t>(i);
     sources[k] = MakeSource(views[static_cast<size_t>(usable[k])], levels);
     if (!maps.empty()) sources[k].surface = maps[static_cast<size_t>(usable[k])];
@@ -117,15 +117,14 @@ int LevelsFor(std::span<const StereoView> views, int reference, std::span<const 
   return levels;
 }
 
-void RunSweeps(const Level& level, Sweep sweep, int iterations, float step_px, int threads,
-               int* round, State* state) {
+void RunSweeps(const Level& level, Sweep sweep, int iterations, float step_px, int* round,
+               State* state) {
   for (int i = 0; i < iterations; ++i) {
     sweep.iteration = i;
     sweep.step_px = step_px * std::exp2(static_cast<float>(-i));
     sweep.round = (*round)++;
     for (sweep.colour = 0; sweep.colour < 2; ++sweep.colour) {
-      ParallelFor(0, level.reference.height, threads,
-                  [&](int y) { SweepRow(level, sweep, y, state); });
+      ParallelFor(0, level.reference.height, [&](int y) { SweepRow(level, sweep, y, state); });
     }
   }
 }
@@ -152,8 +151,7 @@ State SearchPyramid(const StereoView& view, std::span<const GreyImage> pictures,
       const double scale = std::exp2(-static_cast<double>(index));
       const int samples = static_cast<int>(std::clamp(range_px * scale, kMinSamples, kMaxSamples));
       state = EmptyState(level);
-      ParallelFor(0, level.reference.height, options.threads,
-                  [&](int y) { SearchRow(level, samples, y, &state); });
+      ParallelFor(0, level.reference.height, [&](int y) { SearchRow(level, samples, y, &state); });
     } else {
       state = Upsampled(state, coarser, level);
     }
@@ -162,8 +160,7 @@ State SearchPyramid(const StereoView& view, std::span<const GreyImage> pictures,
     const int visits = coarsest     ? iterations + kMoreIterations
                        : index == 0 ? std::max(1, iterations - kMoreIterations)
                                     : iterations;
-    RunSweeps(level, sweep, visits, coarsest ? kFirstStepPx : kFinestStepPx * 2, options.threads,
-              &round, &state);
+    RunSweeps(level, sweep, visits, coarsest ? kFirstStepPx : kFinestStepPx * 2, &round, &state);
     if (index == 0) break;
   }
   *finest = std::move(level);
@@ -203,15 +200,14 @@ struct Problem {
     CheckRequest(views, reference, neighbours, range);
     const int levels = maps.empty() ? LevelsFor(views, reference, neighbours) : 1;
     pictures = Pyramid(MakeGreyImage(*view), levels);
-    sources = MakeSources(views, reference, neighbours, range, maps, max_sources, levels,
-                          options.threads);
+    sources = MakeSources(views, reference, neighbours, range, maps, max_sources, levels);
     if (view->prior != nullptr) prior.emplace(view->prior->load());
     if (view->time_step != nullptr) time_step = view->time_step->load();
   }
 
   /// What is known of a level's pixels beside the photos.
-  void Expect(size_t index, const Mask* open, int threads, Level* level) const {
-    if (prior) level->expected = ExpectedOf(*level, *prior, view->prior->noise, range, threads);
+  void Expect(size_t index, const Mask* open, Level* level) const {
+    if (prior) level->expected = ExpectedOf(*level, *prior, view->prior->noise, range);
     if (open != nullptr) level->open = OpenPixels(*level, *open, 1 << index);
   }
   const Mask* Open() const { return time_step ? &time_step->open : nullptr; }
@@ -219,12 +215,12 @@ struct Problem {
   State Search(int iterations, const Mask* open, const EngineOptions& options) {
     return SearchPyramid(
         *view, pictures, sources, range, iterations, options,
-        [&](size_t index, Level* level) { Expect(index, open, options.threads, level); }, &finest);
+        [&](size_t index, Level* level) { Expect(index, open, level); }, &finest);
   }
 
   State Resume(const PlaneMap& map, const EngineOptions& options) {
     finest = MakeLevel(*view, pictures[0], sources, 0, range, HashOf(options.seed, 0));
-    Expect(0, Open(), options.threads, &finest);
+    Expect(0, Open(), &finest);
     return StateOf(finest, map, range);
   }
 
@@ -238,8 +234,7 @@ struct Problem {
     SuggestBackground(&state);
     Sweep sweep;
     int number = kFollowRoundNumber;
-    RunSweeps(finest, sweep, kFollowIterations, 2 * kFinestStepPx, options.threads, &number,
-              &state);
+    RunSweeps(finest, sweep, kFollowIterations, 2 * kFinestStepPx, &number, &state);
     const Mask lost = LostPixels(finest, state, time_step->open);
     if (std::none_of(lost.data().begin(), lost.data().end(), [](auto m) { return m != 0; })) {
       return state;
@@ -263,10 +258,9 @@ struct Problem {
   Level finest;
 };
 
-DepthEstimate Assessed(const Problem& problem, int threads, State* state,
-                       std::atomic<int>* without_planes) {
+DepthEstimate Assessed(const Problem& problem, State* state, std::atomic<int>* without_planes) {
   bool planes_left_out = false;
-  DepthEstimate estimate = TrustedDepth(problem.finest, *problem.view, problem.range, threads,
+  DepthEstimate estimate = TrustedDepth(problem.finest, *problem.view, problem.range,
                                         problem.time_step.get(), state, &planes_left_out);
   *without_planes += planes_left_out ? 1 : 0;
   return estimate;
@@ -315,7 +309,7 @@ DepthEstimate PatchMatchEngine::Estimate(std::span<const StereoView> views, int 
   Problem problem(views, reference, neighbours, range, {}, Neighbours(), options);
   State state =
       problem.Search(options.look ? kLookIterations : quality_.iterations, problem.Open(), options);
-  return Assessed(problem, options.threads, &state, &without_planes_);
+  return Assessed(problem, &state, &without_planes_);
 }
 
 PlaneMap PatchMatchEngine::Match(std::span<const StereoView> views, int reference,
@@ -338,14 +332,13 @@ PlaneMap PatchMatchEngine::Refine(std::span<const StereoView> views, int referen
   State state = problem.Resume(*maps[static_cast<size_t>(reference)], options);
   HypothesesFromSurfaces(problem.finest, &state);
   problem.SuggestBackground(&state);
-  ParallelFor(0, problem.finest.reference.height, options.threads,
+  ParallelFor(0, problem.finest.reference.height,
               [&](int y) { ExpectRow(problem.finest, y, &state); });
   Sweep sweep;
   sweep.move = sweep.jump = false;
   sweep.far_regions = 0;  // far planes have come as near as they could
   int number = kFirstRoundNumber * round;
-  RunSweeps(problem.finest, sweep, kRefineIterations, kFinestStepPx, options.threads, &number,
-            &state);
+  RunSweeps(problem.finest, sweep, kRefineIterations, kFinestStepPx, &number, &state);
   PlaneMap map = PlanesOf(problem.finest, state, range);
   if (problem.time_step) KeepSettledPlanes(*problem.time_step, &map);
   return map;
@@ -357,7 +350,7 @@ DepthEstimate PatchMatchEngine::Filter(std::span<const StereoView> views, int re
                                        const EngineOptions& options) const {
   Problem problem(views, reference, neighbours, range, maps, quality_.round_neighbours, options);
   State state = problem.Resume(*maps[static_cast<size_t>(reference)], options);
-  return Assessed(problem, options.threads, &state, &without_planes_);
+  return Assessed(problem, &state, &without_planes_);
 }
 
 }  // namespace dtr::stereo

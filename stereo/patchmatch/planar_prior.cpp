@@ -123,7 +123,7 @@ std::optional<Plane> FitAround(const Sums& s, int x, int y, int radius, double g
 }  // namespace
 
 Prior PlanarPrior(const Grid<float>& wanted, const PriorSupport& support, const Reference& picture,
-                  int threads, State* state) {
+                  State* state) {
   const int width = wanted.width(), height = wanted.height();
   Prior prior{Grid<float>(width, height), Grid<float>(width, height)};
   const auto is_open = [&](int x, int y) { return wanted(x, y) != 0 && prior.w(x, y) == 0; };
@@ -150,7 +150,7 @@ Prior PlanarPrior(const Grid<float>& wanted, const PriorSupport& support, const 
       *state->b.at(x, y) = static_cast<float>(plane->b);
     }
   };
-  ParallelFor(0, (height + kBandRows - 1) / kBandRows, threads, [&](int band) {
+  ParallelFor(0, (height + kBandRows - 1) / kBandRows, [&](int band) {
     const int begin = band * kBandRows, end = std::min(height, begin + kBandRows);
     for (const int radius : kRadii) {
       if (!any_open(begin, end)) break;  // sums that unset for

@@ -24,6 +24,6 @@ struct Prior {
 /// pixels of disparity. Sums over fixed bands of rows, so the threads have no influence. Writes the
 /// planes to `state` where the own one misses the prior by more than that is sure of.
 Prior PlanarPrior(const Grid<float>& wanted, const PriorSupport& support, const Reference& picture,
-                  int threads, State* state);
+                  State* state);
 
 }  // namespace dtr::stereo::patchmatch

@@ -103,15 +103,15 @@ std::vector<float> AskedFor(const Level& level, int v) {
 }
 
 /// Makes holes of areas whose texture leaves several places open.
-void RemoveAmbiguous(const Level& level, const State& state, int threads, DepthEstimate* estimate) {
+void RemoveAmbiguous(const Level& level, const State& state, DepthEstimate* estimate) {
   const int w = level.reference.width, h = level.reference.height;
   Grid<std::uint8_t> asked((w + 1) / 2, (h + kAskedRows - 1) / kAskedRows);
-  ParallelFor(0, asked.height(), threads, [&](int v) {
+  ParallelFor(0, asked.height(), [&](int v) {
     const std::vector<float> wanted = level.open ? AskedFor(level, v) : std::vector<float>();
     AmbiguousRow(level, state, std::min(h - 1, kAskedRows * v + kAskedRows / 2),
                  level.open ? wanted.data() : nullptr, asked.row(v));
   });
-  ParallelFor(0, asked.height(), threads, [&](int v) {
+  ParallelFor(0, asked.height(), [&](int v) {
     for (int u = 0; u < asked.width(); ++u) {
       int ambiguous = 0, all = 0;
       for (int j = std::max(0, v - kAskedAsideY);
@@ -139,12 +139,11 @@ bool HasSurfaces(const Level& level) {
 /// The validation results on all pixels of a view, as they come about.
 class Trust {
  public:
-  Trust(const Level& level, const StereoView& view, const DepthRange& range, int threads,
+  Trust(const Level& level, const StereoView& view, const DepthRange& range,
         const TimeStep* time_step, State* state)
       : level_(level),
         view_(view),
         near_z_(range.near_z),
-        threads_(threads),
         time_step_(time_step),
         typical_px_per_w_(time_step != nullptr ? MeanPxPerInverseDepth(level) : 0),
         state_(state),
@@ -154,7 +153,7 @@ class Trust {
   void BelieveWhatIsSeen() {
     const Limits limits = HasSurfaces(level_) ? kAfterRounds : kAfterSearch;
     Grid<std::uint8_t> consistent(width(), height());
-    ParallelFor(0, height(), threads_, [&](int y) {
+    ParallelFor(0, height(), [&](int y) {
       std::vector<PixelEstimate> row(static_cast<size_t>(width()));
       EstimateRow(level_, *state_, y, level_.open ? level_.open->at(0, y) : nullptr, row.data());
       for (int x = 0; x < width(); ++x) {
@@ -176,7 +175,7 @@ class Trust {
     RemoveSpeckles(
         {px_per_w_, consistent, static_cast<float>(near_z_), level_.w_max - level_.w_min},
         &result_);
-    RemoveAmbiguous(level_, *state_, threads_, &result_);
+    RemoveAmbiguous(level_, *state_, &result_);
   }
 
   /// Gives a depth to what has none, and a better one to what is vague, where the planes around
@@ -184,7 +183,7 @@ class Trust {
   /// could be of use to hardly a pixel.
   bool AskThePlanesAround() {
     std::atomic<std::int64_t> doubtful{0};
-    ParallelFor(0, height(), threads_, [&](int y) {
+    ParallelFor(0, height(), [&](int y) {
       std::int64_t in_row = 0;
       for (int x = 0; x < width(); ++x) {
         if (DepthImage::IsHole(result_.depth(x, y))) {
@@ -199,8 +198,8 @@ class Trust {
     const double pixels = static_cast<double>(width()) * height();
     if (static_cast<double>(doubtful) <= kFewDoubtful * pixels) return false;
     const Prior prior =
-        PlanarPrior(cost_, {believed_, sigma_px_, px_per_w_}, level_.reference, threads_, state_);
-    ParallelFor(0, height(), threads_, [&](int y) {
+        PlanarPrior(cost_, {believed_, sigma_px_, px_per_w_}, level_.reference, state_);
+    ParallelFor(0, height(), [&](int y) {
       std::vector<PixelEstimate> row(static_cast<size_t>(width()));
       EstimateRow(level_, *state_, y, prior.w.row(y), row.data());
       for (int x = 0; x < width(); ++x) {
@@ -217,7 +216,7 @@ class Trust {
   /// undecided, and makes vague depths that agree with it surer. Depths that contradict it stay.
   void AskTheInstrument() {
     if (!level_.expected) return;
-    ParallelFor(0, height(), threads_, [&](int y) {
+    ParallelFor(0, height(), [&](int y) {
       std::vector<float> vague(static_cast<size_t>(width()), 0);
       for (int x = 0; x < width(); ++x) {
         const float certainty = *level_.expected->inverse_sigma.at(x, y);
@@ -297,7 +296,6 @@ class Trust {
   const Level& level_;
   const StereoView& view_;
   const double near_z_;
-  const int threads_;
   const TimeStep* const time_step_;
   const float typical_px_per_w_;  ///< of settled pixels, whose planes are not looked at
   State* const state_;
@@ -311,9 +309,8 @@ class Trust {
 }  // namespace
 
 DepthEstimate TrustedDepth(const Level& level, const StereoView& view, const DepthRange& range,
-                           int threads, const TimeStep* time_step, State* state,
-                           bool* planes_left_out) {
-  Trust trust(level, view, range, threads, time_step, state);
+                           const TimeStep* time_step, State* state, bool* planes_left_out) {
+  Trust trust(level, view, range, time_step, state);
   trust.BelieveWhatIsSeen();
   trust.AskTheInstrument();
   int passes = 0;

@@ -14,7 +14,6 @@ namespace dtr::stereo::patchmatch {
 /// and no planes were fitted. With `time_step` (that of level.open) settled pixels keep their
 /// depth, and open ones alone are asked.
 DepthEstimate TrustedDepth(const Level& level, const StereoView& view, const DepthRange& range,
-                           int threads, const TimeStep* time_step, State* state,
-                           bool* planes_left_out);
+                           const TimeStep* time_step, State* state, bool* planes_left_out);
 
 }  // namespace dtr::stereo::patchmatch

@@ -114,11 +114,11 @@ class Voter {
 }  // namespace
 
 DepthEstimate FusePairs(const PinholeCamera& camera, const Mask* mask,
-                        std::span<const PairDepth> sweeps, int pair_count, const DepthRange& range,
-                        int threads) {
+                        std::span<const PairDepth> sweeps, int pair_count,
+                        const DepthRange& range) {
   const int w = camera.width_px(), h = camera.height_px();
   DepthEstimate result{DepthImage(w, h), Grid<float>(w, h)};
-  ParallelFor(0, h, threads, [&](int y) {
+  ParallelFor(0, h, [&](int y) {
     Voter voter(pair_count);
     for (int x = 0; x < w; ++x) {
       if (mask != nullptr && !mask->empty() && (*mask)(x, y) == 0) continue;

@@ -16,8 +16,7 @@ namespace dtr::stereo {
 /// and masked pixels are holes. sigma of 1/z combines the noise of a disparity and the spread of
 /// the group. `pair_count` is the number of pairs matched. The result does not depend on `threads`.
 DepthEstimate FusePairs(const PinholeCamera& camera, const Mask* mask,
-                        std::span<const PairDepth> sweeps, int pair_count, const DepthRange& range,
-                        int threads);
+                        std::span<const PairDepth> sweeps, int pair_count, const DepthRange& range);
 
 /// Makes holes of connected areas of fewer than `min_pixels` pixels; neighbours are connected where
 /// their inverse depths differ by at most `max_steps` times the finest pair's pixel of disparity.

@@ -100,7 +100,7 @@ std::vector<Eigen::Vector3d> FindPlanes(const StereoView& reference, const GreyI
     }
   }
   std::vector<PairDepth> sweeps(tasks.size());
-  ParallelFor(0, static_cast<int>(tasks.size()), options.threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(tasks.size()), [&](int i) {
     const Task& task = tasks[static_cast<size_t>(i)];
     const auto k = static_cast<size_t>(task.pair);
     sweeps[static_cast<size_t>(i)] =
@@ -108,7 +108,7 @@ std::vector<Eigen::Vector3d> FindPlanes(const StereoView& reference, const GreyI
     sweeps[static_cast<size_t>(i)].pair = task.pair;
   });
   const DepthEstimate map =
-      FusePairs(grid, nullptr, sweeps, static_cast<int>(rectified.size()), range, options.threads);
+      FusePairs(grid, nullptr, sweeps, static_cast<int>(rectified.size()), range);
   return DominantPlanes(map.depth, grid, sweeps.front().step_from_ray, {});
 }
 
@@ -160,16 +160,15 @@ DepthEstimate SgbmEngine::Estimate(std::span<const StereoView> views, int refere
   const std::vector<Task> tasks =
       TasksOf(pairs, FindPlanes(view, picture, pairs, pictures, range, limits_, options));
   std::vector<PairDepth> sweeps(tasks.size());
-  const int at_once = std::min(ResolveThreads(options.threads), PairsAtOnce(pairs, options));
-  ParallelFor(0, static_cast<int>(tasks.size()), at_once, [&](int i) {
+  ParallelFor(0, static_cast<int>(tasks.size()), PairsAtOnce(pairs, options), [&](int i) {
     const Task& task = tasks[static_cast<size_t>(i)];
     const auto k = static_cast<size_t>(task.pair);
     PairDepth& sweep = sweeps[static_cast<size_t>(i)];
     sweep = MatchPair(picture, pictures[k], *task.rectified, task.sweep, view.camera);
     sweep.pair = task.pair;
   });
-  DepthEstimate estimate = FusePairs(view.camera, view.mask, sweeps, static_cast<int>(pairs.size()),
-                                     range, options.threads);
+  DepthEstimate estimate =
+      FusePairs(view.camera, view.mask, sweeps, static_cast<int>(pairs.size()), range);
   const int min_pixels = static_cast<int>(kSgbmSpeckleShare * view.camera.width_px() *
                                           static_cast<double>(view.camera.height_px()));
   RemoveSpeckles(view.camera, sweeps, min_pixels, kSpeckleSteps, &estimate);

@@ -10,6 +10,7 @@
 #include "datasets/exact/analytic_scene.h"
 #include "dtr/advise/look.h"
 #include "dtr/advise/places.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::advise {
 namespace {
@@ -156,7 +157,8 @@ TEST(WhyPoor, NamesTheLimitsThatAPlaceMissesAndNoOther) {
 
 TEST(Advise, IsTheSameForAnyNumberOfThreads) {
   const auto views = Row(Plane({0, 0, 1}, kWallZ), {0, 1, 2, 8, 9, 10});
-  const Advice one = AdviseOn(views, {.threads = 1}), three = AdviseOn(views, {.threads = 3});
+  const Advice one = OnThreads(1, [&] { return AdviseOn(views, {}); });
+  const Advice three = OnThreads(3, [&] { return AdviseOn(views, {}); });
   ASSERT_EQ(one.places.size(), three.places.size());
   for (size_t i = 0; i < one.places.size(); ++i) {
     EXPECT_EQ(one.places[i].gap_deg, three.places[i].gap_deg);

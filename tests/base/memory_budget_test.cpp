@@ -7,6 +7,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr {
 namespace {
@@ -15,13 +16,15 @@ namespace {
 double MaxHeld(double room_gb, double bytes, int threads) {
   MemoryBudget budget(room_gb);
   std::atomic<int> held{0}, most{0};
-  ParallelFor(0, 60, threads, [&](int) {
-    const auto share = budget.Take(bytes);
-    const int now = ++held;
-    for (int seen = most; now > seen && !most.compare_exchange_weak(seen, now);) {
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    --held;
+  OnThreads(threads, [&] {
+    return ParallelFor(0, 60, [&](int) {
+      const auto share = budget.Take(bytes);
+      const int now = ++held;
+      for (int seen = most; now > seen && !most.compare_exchange_weak(seen, now);) {
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      --held;
+    });
   });
   return most * bytes;
 }
@@ -42,7 +45,7 @@ TEST(MemoryBudget, WithoutABoundNobodyWaits) {
 TEST(MemoryBudget, SharesOfManySizesAllComeThrough) {
   MemoryBudget budget(1);
   std::atomic<int> done{0};
-  ParallelFor(0, 200, 8, [&](int i) {
+  ParallelFor(0, 200, [&](int i) {
     const auto share = budget.Take(0.05e9 * (i % 30));
     ++done;
   });

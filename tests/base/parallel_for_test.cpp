@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <functional>
 #include <mutex>
 #include <set>
 #include <stdexcept>
@@ -17,27 +18,32 @@
 namespace dtr {
 namespace {
 
+void ForOn(int threads, int begin, int end, const std::function<void(int)>& body) {
+  const ThreadLimit limit(threads);
+  ParallelFor(begin, end, body);
+}
+
 TEST(ParallelFor, RunsEveryItemOnceForAnyNumberOfThreads) {
   for (const int threads : {1, 2, 7, 64}) {
     std::vector<std::atomic<int>> runs(1000);
-    ParallelFor(0, 1000, threads, [&](int i) { ++runs[static_cast<size_t>(i)]; });
+    ForOn(threads, 0, 1000, [&](int i) { ++runs[static_cast<size_t>(i)]; });
     for (const auto& count : runs) ASSERT_EQ(count, 1) << threads << " threads";
   }
 }
 
 TEST(ParallelFor, EmptyAndReversedRangesRunNothing) {
   int runs = 0;
-  ParallelFor(5, 5, 2, [&](int) { ++runs; });
-  ParallelFor(5, 3, 2, [&](int) { ++runs; });
+  ForOn(2, 5, 5, [&](int) { ++runs; });
+  ForOn(2, 5, 3, [&](int) { ++runs; });
   EXPECT_EQ(runs, 0);
 }
 
 TEST(ParallelFor, RethrowsAnExceptionOfTheBody) {
   for (const int threads : {1, 4}) {
-    EXPECT_THROW(ParallelFor(0, 100, threads,
-                             [](int i) {
-                               if (i == 17) throw std::runtime_error("seventeen");
-                             }),
+    EXPECT_THROW(ForOn(threads, 0, 100,
+                       [](int i) {
+                         if (i == 17) throw std::runtime_error("seventeen");
+                       }),
                  std::runtime_error);
   }
 }
@@ -45,8 +51,8 @@ TEST(ParallelFor, RethrowsAnExceptionOfTheBody) {
 TEST(ParallelFor, TheExceptionIsThatOfTheFirstItemThatThrewHoweverLoopsNest) {
   for (int run = 0; run < 20; ++run) {
     try {
-      ParallelFor(0, 8, 4, [](int i) {
-        ParallelFor(0, 8, 4, [i](int j) {
+      ForOn(4, 0, 8, [](int i) {
+        ForOn(4, 0, 8, [i](int j) {
           if (j == 3) throw std::runtime_error(std::to_string(i));
         });
       });
@@ -71,18 +77,18 @@ bool Meet(std::atomic<int>& here, int wanted) {
 
 TEST(ParallelFor, LoopsInsideALoopShareItsThreads) {
   std::atomic<int> here{0}, met{0};
-  ParallelFor(0, 2, 6, [&](int) {
-    ParallelFor(0, 3, 6, [&](int) { met += Meet(here, 6); });  // six items, six threads
+  ForOn(6, 0, 2, [&](int) {
+    ForOn(6, 0, 3, [&](int) { met += Meet(here, 6); });  // six items, six threads
   });
   EXPECT_EQ(met, 6);
 }
 
 TEST(ParallelFor, NoMoreThreadsAtOnceThanTheLargestRequest) {
-  ParallelFor(0, 64, 64, [](int) { std::this_thread::sleep_for(std::chrono::milliseconds(1)); });
+  ForOn(64, 0, 64, [](int) { std::this_thread::sleep_for(std::chrono::milliseconds(1)); });
   std::atomic<int> running{0}, most{0};
   for (int run = 0; run < 20; ++run) {
-    ParallelFor(0, 5, 3, [&](int) {
-      ParallelFor(0, 40, 3, [&](int) {
+    ForOn(3, 0, 5, [&](int) {
+      ForOn(3, 0, 40, [&](int) {
         const int now = ++running;
         for (int seen = most; seen < now && !most.compare_exchange_weak(seen, now);) {
         }
@@ -99,7 +105,7 @@ TEST(ParallelFor, LoopsOneAfterTheOtherUseTheSameThreads) {
   std::mutex mutex;
   std::set<pid_t> threads;
   for (int run = 0; run < 200; ++run) {
-    ParallelFor(0, 8, 4, [&](int) {
+    ForOn(4, 0, 8, [&](int) {
       const std::lock_guard lock(mutex);
       threads.insert(gettid());
     });
@@ -109,10 +115,9 @@ TEST(ParallelFor, LoopsOneAfterTheOtherUseTheSameThreads) {
 
 TEST(ParallelFor, DeepNestsEnd) {
   std::atomic<int> leaves{0};
-  ParallelFor(0, 4, 4, [&](int) {
-    ParallelFor(0, 4, 4, [&](int) {
-      ParallelFor(0, 4, 4, [&](int) { ParallelFor(0, 4, 4, [&](int) { ++leaves; }); });
-    });
+  ForOn(4, 0, 4, [&](int) {
+    ForOn(4, 0, 4,
+          [&](int) { ForOn(4, 0, 4, [&](int) { ForOn(4, 0, 4, [&](int) { ++leaves; }); }); });
   });
   EXPECT_EQ(leaves, 256);
 }
@@ -122,7 +127,7 @@ TEST(ParallelFor, LoopsOfSeveralThreadsTakeNoThreadsFromEachOther) {
   {
     std::vector<std::jthread> callers;
     for (int caller = 0; caller < 2; ++caller) {
-      callers.emplace_back([&] { ParallelFor(0, 2, 2, [&](int) { met += Meet(here, 4); }); });
+      callers.emplace_back([&] { ForOn(2, 0, 2, [&](int) { met += Meet(here, 4); }); });
     }
   }
   EXPECT_EQ(met, 4);
@@ -134,7 +139,7 @@ TEST(ParallelFor, SeveralThreadsMayBeginLoopsAtOnce) {
     std::vector<std::jthread> callers;
     for (int caller = 0; caller < 4; ++caller) {
       callers.emplace_back([&] {
-        for (int run = 0; run < 50; ++run) ParallelFor(0, 20, 4, [&](int) { ++items; });
+        for (int run = 0; run < 50; ++run) ForOn(4, 0, 20, [&](int) { ++items; });
       });
     }
   }
@@ -146,12 +151,12 @@ TEST(ParallelFor, AForkedProcessHasThreadsOfItsOwn) {
 #ifdef __SANITIZE_THREAD__
   GTEST_SKIP() << "ThreadSanitizer starts no threads after a fork";
 #endif
-  ParallelFor(0, 8, 4, [](int) {});
+  ForOn(4, 0, 8, [](int) {});
   const pid_t child = fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
     std::atomic<int> here{0}, met{0};
-    ParallelFor(0, 3, 3, [&](int) { met += Meet(here, 3); });
+    ForOn(3, 0, 3, [&](int) { met += Meet(here, 3); });
     _exit(met == 3 ? 0 : 1);
   }
   int status = -1;
@@ -159,9 +164,34 @@ TEST(ParallelFor, AForkedProcessHasThreadsOfItsOwn) {
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
 }
 
-TEST(ResolveThreads, PositiveIsKeptAndZeroMeansAllCores) {
-  EXPECT_EQ(ResolveThreads(3), 3);
-  EXPECT_GE(ResolveThreads(0), 1);
+TEST(ThreadLimit, HoldsUntilItGoesAndInTheLoopsInside) {
+  const int all = ThreadLimit::Current();
+  EXPECT_GE(all, 1);
+  const ThreadLimit three(3);
+  {
+    const ThreadLimit one(1);
+    EXPECT_EQ(ThreadLimit::Current(), 1);
+    const ThreadLimit every(0);
+    EXPECT_EQ(ThreadLimit::Current(), all);
+  }
+  std::atomic<int> right{0};
+  ParallelFor(0, 50, [&](int) { right += ThreadLimit::Current() == 3; });
+  EXPECT_EQ(right, 50);
+  std::jthread([&] { EXPECT_EQ(ThreadLimit::Current(), all); });  // its own
+}
+
+TEST(ParallelFor, NoMoreItemsAtOnceThanAskedForAndAllThreadsInsideThem) {
+  std::atomic<int> here{0}, met{0}, at_once{0}, most{0};
+  const ThreadLimit limit(4);
+  ParallelFor(0, 6, 2, [&](int) {
+    most = std::max(most.load(), ++at_once);
+    EXPECT_EQ(ThreadLimit::Current(), 4);
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    --at_once;
+  });
+  EXPECT_LE(most, 2);
+  ParallelFor(0, 2, 1, [&](int) { ParallelFor(0, 4, [&](int) { met += Meet(here, 4); }); });
+  EXPECT_GE(met, 4);
 }
 
 }  // namespace

@@ -37,7 +37,6 @@ void Report(const char* set_file, int frames, int repeats) {
   const dtr::RenderScene scene = dtr::MakeRenderScene(set);
   dtr::RenderOptions options;
   options.fill_holes = options.smooth_edges = true;
-  options.threads = 1;
   dtr::simd::Renderer renderer;
   const std::vector<dtr::NovelCamera> path = dtr::FlyThrough(set, frames);
   std::vector<double> least_ms(path.size());

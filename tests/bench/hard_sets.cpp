@@ -116,7 +116,7 @@ int Run(int argc, char** argv) {
   for (const datasets::HardSet& set : sets) {
     if (task == "list") fmt::print("{}\t{}\n", set.name, set.what);
     if (task != "make" || argc != 4 || set.name != argv[2]) continue;
-    datasets::WriteHardSet(set, argv[3], 0);
+    datasets::WriteHardSet(set, argv[3]);
     return 0;
   }
   if (task == "list") return 0;

@@ -32,7 +32,6 @@ int main(int argc, char** argv) {
     dtr::io::LoadOptions options;
     options.images = options.depth = options.completed = options.sigma = options.held_out = true;
     options.collapse_duplicates = false;  // every view, as Python has them
-    options.threads = 1;
     const double start = CpuSeconds();
     const dtr::DtrSet set = dtr::io::LoadSet(argv[1], options);
     const double seconds = CpuSeconds() - start;

@@ -45,7 +45,7 @@ int main(int argc, char** argv) {
     for (const dtr::View& view : set.frames[0].views) {
       const double start = CpuMilliseconds();
       std::string unfit;
-      const dtr::AdaptiveMesh mesh = dtr::MakeAdaptiveMesh(view, options, 1, unfit);
+      const dtr::AdaptiveMesh mesh = dtr::MakeAdaptiveMesh(view, options, unfit);
       ms += CpuMilliseconds() - start;
       triangles += double(mesh.indices.size()) / 3;
       cells += double(mesh.cells.size());

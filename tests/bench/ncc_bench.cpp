@@ -17,6 +17,7 @@
 #include "datasets/exact/stereo_quality.h"
 #include "stereo/patchmatch/hypotheses.h"
 #include "stereo/patchmatch/level.h"
+#include "tests/support/on_threads.h"
 
 namespace {
 
@@ -112,7 +113,7 @@ void PrintScaling(const Scene& scene) {
   double cpu[2], wall[2];
   for (const int threads : {1, 2}) {
     const double c = CpuSeconds(), w = WallSeconds();
-    testing::EstimateFirstBy("patchmatch", scene.views, kRange, threads);
+    OnThreads(threads, [&] { return testing::EstimateFirstBy("patchmatch", scene.views, kRange); });
     cpu[threads - 1] = CpuSeconds() - c;
     wall[threads - 1] = WallSeconds() - w;
     fmt::print("{} thread{}: {:.2f} CPU s, {:.2f} wall s, {:.2f} cores in use\n", threads,

@@ -1,7 +1,7 @@
 // render_report: which rendering options suit a set? PSNR on photos it was not rendered from, one
 // line for every combination of the values given; docs/accuracy/RENDERING.md has the figures.
 //
-//   render_report SET.dtr [held-out] [threads=N] [KEY=VALUE[,VALUE...]]...
+//   render_report SET.dtr [held-out] [KEY=VALUE[,VALUE...]]...
 //   render_report sceaux.dtr views=1,2,4,8 exponent=8,64 linear=0,1
 //
 // KEY is one of those in Keys() below; `blend` and `splat` take the number of the enumerator
@@ -36,7 +36,6 @@ const std::map<std::string, Setter>& Keys() {
       {"break", [](auto& o, double v) { o.depth_break_px = v; }},
       {"resolution", [](auto& o, double v) { o.resolution = static_cast<int>(v); }},
       {"linear", [](auto& o, double v) { o.blend_in_linear_light = v != 0; }},
-      {"threads", [](auto& o, double v) { o.threads = static_cast<int>(v); }},
   };
   return keys;
 }
@@ -60,7 +59,7 @@ std::vector<Row> Expand(const std::vector<Row>& rows, const std::string& argumen
       const std::string value = argument.substr(begin, end - begin);
       Row next = row;
       Keys().at(key)(next.render, std::stod(value));
-      if (key != "threads") next.label += " " + key + "=" + value;
+      next.label += " " + key + "=" + value;
       expanded.push_back(next);
       begin = end + 1;
     }

@@ -1,6 +1,6 @@
 // tests/bench/stereo_collection.cpp -- what does a stereo engine make of a real collection?
 //
-//   stereo_collection MODEL IMAGES OUT [--engine NAME] [--neighbours K] [--agree N] [--threads T]
+//   stereo_collection MODEL IMAGES OUT [--engine NAME] [--neighbours K] [--agree N]
 //   [--every N]
 //
 // MODEL is a COLMAP model of PINHOLE cameras (undistorted photos), IMAGES their folder. Writes
@@ -108,7 +108,6 @@ void Run(int argc, char** argv) {
   const Collection c = Load(argv[1], argv[2]);
   stereo::DepthMapsOptions options;
   options.consistency.min_agreeing = number("--agree", options.consistency.min_agreeing);
-  options.engine.threads = number("--threads", 0);
   const int every = number("--every", 1);
   const auto engine = stereo::MakeEngine(given.count("--engine") ? given["--engine"] : "sgbm");
   options.neighbours.count = number("--neighbours", engine->Neighbours());

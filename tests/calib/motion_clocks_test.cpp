@@ -65,7 +65,7 @@ MotionSeen Camera(const std::string& name, double angle, double later, int frame
 
 std::string RejectionOf(const std::vector<MotionSeen>& cameras) {
   try {
-    FindMotionClocks(cameras, 2);
+    FindMotionClocks(cameras);
   } catch (const Error& error) {
     return error.what();
   }
@@ -80,7 +80,7 @@ TEST(MotionClocks, AreFoundToAFractionOfAFrame) {
   for (int c = 0; c < 5; ++c) {
     cameras.push_back(Camera("cam" + std::to_string(c), 0.3 * c, later[c], 60, Wandering));
   }
-  const std::vector<MotionClock> clocks = FindMotionClocks(cameras, 2);
+  const std::vector<MotionClock> clocks = FindMotionClocks(cameras);
   ASSERT_EQ(clocks.size(), 5u);
   EXPECT_EQ(clocks[0].later, 0);
   for (size_t c = 0; c < 5; ++c) {
@@ -94,7 +94,7 @@ TEST(MotionClocks, LongerRecordingsAndMissingFramesDoNotMatter) {
   std::vector<MotionSeen> cameras{Camera("a", 0, 0, 50, Wandering),
                                   Camera("b", 0.5, 5, 70, Wandering)};
   for (const size_t lost : {9, 10, 23, 24, 40}) cameras[1].cells[lost] = {};
-  EXPECT_NEAR(FindMotionClocks(cameras, 1)[1].later, 5, 0.05);
+  EXPECT_NEAR(FindMotionClocks(cameras)[1].later, 5, 0.05);
 }
 
 TEST(MotionClocks, ACameraWithoutMotionIsNamed) {

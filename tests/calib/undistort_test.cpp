@@ -10,6 +10,7 @@
 #include "dtr/base/random.h"
 #include "dtr/types/area_average.h"
 #include "tests/calib/lens_models.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::calib {
 namespace {
@@ -74,7 +75,7 @@ double WorstDifference(const UndistortedPhoto& photo, double slip, int margin) {
 TEST(Undistort, GivesBackTheSceneThatTheLensDistorted) {
   constexpr int kMargin = 4;  // the kernel repeats the photo's border there
   for (const LensCamera& lens : {kBarrel, kPincushion, kFisheye}) {
-    const UndistortedPhoto photo = Undistort(PhotoOf(lens), lens, 0, 2);
+    const UndistortedPhoto photo = Undistort(PhotoOf(lens), lens, 0);
     EXPECT_EQ(photo.camera, lens.Pinhole());
     EXPECT_LT(WorstDifference(photo, 0, kMargin), kIntensity) << NameOf(lens.model);
     // The control: a slip of half a pixel must be far outside that limit.
@@ -86,18 +87,18 @@ TEST(Undistort, GivesBackTheSceneThatTheLensDistorted) {
 TEST(Undistort, DrawsOntoACameraWhosePrincipalPointLiesElsewhere) {
   for (const LensCamera& lens : {kBarrel, kFisheye}) {
     const PinholeCamera onto(kWidth, kHeight, kFocal, kFocal, 80.25, 60.5);
-    const UndistortedPhoto photo = Undistort(PhotoOf(lens), {}, lens, onto, 0, 2);
+    const UndistortedPhoto photo = Undistort(PhotoOf(lens), {}, lens, onto, 0);
     EXPECT_EQ(photo.camera, onto);
     EXPECT_LT(WorstDifference(photo, 0, 4), kIntensity) << NameOf(lens.model);
     EXPECT_GT(WorstDifference(photo, 0.1, 4), kIntensity) << NameOf(lens.model);
   }
-  EXPECT_THROW(Undistort(PhotoOf(kBarrel), {}, kBarrel, PinholeCamera(8, 8, 9, 9, 4, 4), 0, 1),
+  EXPECT_THROW(Undistort(PhotoOf(kBarrel), {}, kBarrel, PinholeCamera(8, 8, 9, 9, 4, 4), 0),
                std::invalid_argument);
 }
 
 TEST(Undistort, MaskTellsExactlyWhichPixelsTheLensSaw) {
   for (const LensCamera& lens : {kBarrel, kPincushion, kFisheye}) {
-    const UndistortedPhoto photo = Undistort(PhotoOf(lens), lens, 0, 1);
+    const UndistortedPhoto photo = Undistort(PhotoOf(lens), lens, 0);
     const PinholeCamera photo_area = lens.Pinhole();
     int missing = 0;
     for (int y = 0; y < kHeight; ++y) {
@@ -122,7 +123,7 @@ TEST(Undistort, MaskTellsExactlyWhichPixelsTheLensSaw) {
 }
 
 TEST(Undistort, CornersOfAPincushionPhotoAreMaskedAndItsCentreIsNot) {
-  const UndistortedPhoto photo = Undistort(PhotoOf(kPincushion), kPincushion, 0, 1);
+  const UndistortedPhoto photo = Undistort(PhotoOf(kPincushion), kPincushion, 0);
   ASSERT_FALSE(photo.mask.empty());
   for (const int y : {0, kHeight - 1}) {
     for (const int x : {0, kWidth - 1}) EXPECT_EQ(photo.mask(x, y), 0);
@@ -138,8 +139,8 @@ TEST(Undistort, WhatMayNotBeUsedIsMaskedWhereTheLensShowsIt) {
     for (int y = 30; y < 60; ++y) {
       for (int x = 20; x < 50; ++x) usable(x, y) = 0;
     }
-    const UndistortedPhoto photo = Undistort(PhotoOf(lens), usable, lens, 0, 2);
-    const UndistortedPhoto whole = Undistort(PhotoOf(lens), lens, 0, 2);
+    const UndistortedPhoto photo = Undistort(PhotoOf(lens), usable, lens, 0);
+    const UndistortedPhoto whole = Undistort(PhotoOf(lens), lens, 0);
     ASSERT_FALSE(photo.mask.empty());
     for (int y = 0; y < kHeight; ++y) {
       for (int x = 0; x < kWidth; ++x) {
@@ -157,19 +158,17 @@ TEST(Undistort, WhatMayNotBeUsedIsMaskedWhereTheLensShowsIt) {
         }
       }
     }
-    const UndistortedPhoto all =
-        Undistort(PhotoOf(lens), Mask(kWidth, kHeight, 1, 255), lens, 0, 1);
+    const UndistortedPhoto all = Undistort(PhotoOf(lens), Mask(kWidth, kHeight, 1, 255), lens, 0);
     EXPECT_EQ(all.mask, whole.mask);
     EXPECT_EQ(all.image, whole.image);
   }
-  EXPECT_THROW(Undistort(PhotoOf(kBarrel), Mask(8, 8, 1, 255), kBarrel, 0, 1),
-               std::invalid_argument);
+  EXPECT_THROW(Undistort(PhotoOf(kBarrel), Mask(8, 8, 1, 255), kBarrel, 0), std::invalid_argument);
 }
 
 TEST(Undistort, RaysBeyondTheModelsReachAreMasked) {
   // The distortion turns back at r = 0.58, inside the image: nothing beyond may be shown.
   const LensCamera lens{CameraModel::kSimpleRadial, kWidth, kHeight, {60, 80, 60, -1.0}};
-  const UndistortedPhoto photo = Undistort(ImageRgb8(kWidth, kHeight, 3, 200), lens, 0, 1);
+  const UndistortedPhoto photo = Undistort(ImageRgb8(kWidth, kHeight, 3, 200), lens, 0);
   ASSERT_FALSE(photo.mask.empty());
   EXPECT_EQ(photo.mask(80, 60), 255);
   EXPECT_EQ(photo.mask(80 + 33, 60), 255);  // r = 33.5 / 60
@@ -181,10 +180,10 @@ TEST(Undistort, PhotosWithoutDistortionKeepTheirBytes) {
   ImageRgb8 photo(kWidth, kHeight, 3);
   for (auto& value : photo.data()) value = static_cast<std::uint8_t>(random.Index(256));
   const LensCamera lens{CameraModel::kOpenCv, kWidth, kHeight, {150, 150, 80, 60, 0, 0, 0, 0}};
-  const UndistortedPhoto same = Undistort(photo, lens, 0, 1);
+  const UndistortedPhoto same = Undistort(photo, lens, 0);
   EXPECT_EQ(same.image, photo);
   EXPECT_TRUE(same.mask.empty());
-  const UndistortedPhoto half = Undistort(photo, lens, 80, 1);
+  const UndistortedPhoto half = Undistort(photo, lens, 80);
   EXPECT_EQ(half.image, AreaAverage(photo, 80, 60));
   EXPECT_EQ(half.camera, PinholeCamera(80, 60, 75, 75, 40, 30));
 }
@@ -192,7 +191,7 @@ TEST(Undistort, PhotosWithoutDistortionKeepTheirBytes) {
 TEST(Undistort, ShrinkingKeepsTheGridOverTheScene) {
   // Area averages soften a pattern; compare with the same averages of the scene, 8x8 samples each.
   for (const LensCamera& lens : {kBarrel, kFisheye}) {
-    const UndistortedPhoto photo = Undistort(PhotoOf(lens), lens, 100, 1);
+    const UndistortedPhoto photo = Undistort(PhotoOf(lens), lens, 100);
     ASSERT_EQ(photo.image.width(), 100);
     ASSERT_EQ(photo.image.height(), 75);
     EXPECT_EQ(photo.camera, lens.Pinhole().Resized(100, 75));
@@ -215,8 +214,8 @@ TEST(Undistort, ShrinkingKeepsTheGridOverTheScene) {
 
 TEST(Undistort, ShrunkMaskCoversEveryPixelThatTouchesAMissingOne) {
   const ImageRgb8 distorted = PhotoOf(kPincushion);
-  const UndistortedPhoto full = Undistort(distorted, kPincushion, 0, 1);
-  const UndistortedPhoto small = Undistort(distorted, kPincushion, 50, 1);
+  const UndistortedPhoto full = Undistort(distorted, kPincushion, 0);
+  const UndistortedPhoto small = Undistort(distorted, kPincushion, 50);
   EXPECT_EQ(small.mask, ShrinkMask(full.mask, 50, 38));
   for (int y = 0; y < 38; ++y) {
     for (int x = 0; x < 50; ++x) {
@@ -229,16 +228,17 @@ TEST(Undistort, ShrunkMaskCoversEveryPixelThatTouchesAMissingOne) {
 
 TEST(Undistort, SameBytesForAnyNumberOfThreads) {
   const ImageRgb8 distorted = PhotoOf(kPincushion);
-  const UndistortedPhoto one = Undistort(distorted, kPincushion, 97, 1);
+  const UndistortedPhoto one = OnThreads(1, [&] { return Undistort(distorted, kPincushion, 97); });
   for (const int threads : {2, 5}) {
-    const UndistortedPhoto more = Undistort(distorted, kPincushion, 97, threads);
+    const UndistortedPhoto more =
+        OnThreads(threads, [&] { return Undistort(distorted, kPincushion, 97); });
     EXPECT_EQ(more.image, one.image);
     EXPECT_EQ(more.mask, one.mask);
   }
 }
 
 TEST(Undistort, RejectsAPhotoOfAnotherSize) {
-  EXPECT_THROW(Undistort(ImageRgb8(kHeight, kWidth, 3), kBarrel, 0, 1), Error);
+  EXPECT_THROW(Undistort(ImageRgb8(kHeight, kWidth, 3), kBarrel, 0), Error);
 }
 
 TEST(UndistortedPixel, InvertsWhatUndistortionDid) {

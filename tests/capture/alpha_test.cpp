@@ -17,7 +17,7 @@ using ::testing::HasSubstr;
 
 Capture Ingest(const fs::path& folder) {
   SilentProgress progress;
-  return IngestPhotos(folder, {.threads = 2}, progress);
+  return IngestPhotos(folder, {}, progress);
 }
 
 // Blocks in the middle; white under transparent pixels about them.
@@ -83,11 +83,11 @@ TEST(PhotosWithAlpha, SfmAndAStoredCaptureHaveTheMaskAndNoHiddenColour) {
   Mask alpha;
   WriteCutOut(folder / "photos/a.png", alpha);
   const Capture capture = Ingest(folder / "photos");
-  WriteCapture(capture, folder / "cap", 1);
+  WriteCapture(capture, folder / "cap");
   EXPECT_EQ(io::ReadMask(folder / "cap/masks/a.png"), alpha);
   for (const Capture& read : {capture, ReadCapture(folder / "cap")}) {
     EXPECT_EQ(ReadPhotoMask(read.photos[0]), alpha);
-    PrepareSfmImages(read, folder / "sfm", 24, 1);
+    PrepareSfmImages(read, folder / "sfm", 24);
     const ImageRgb8 image = io::ReadImage(folder / "sfm/a.png");
     for (const std::uint8_t value : image.data()) ASSERT_LT(value, 240);  // blocks end at 227
     const Mask mask = io::ReadMask(SfmMaskFile(folder / "sfm", read.photos[0]));

@@ -23,7 +23,7 @@ using ::testing::IsEmpty;
 
 Capture Ingest(const fs::path& folder) {
   SilentProgress progress;
-  return IngestPhotos(folder, {.threads = 2}, progress);
+  return IngestPhotos(folder, {}, progress);
 }
 
 std::vector<std::string> NamesOf(const Capture& capture) {

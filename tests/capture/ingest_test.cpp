@@ -29,7 +29,8 @@ using testing::NoisePhoto;
 
 Capture Ingest(const fs::path& folder, int threads = 2) {
   SilentProgress progress;
-  return IngestPhotos(folder, {.threads = threads}, progress);
+  const ThreadLimit limit(threads);
+  return IngestPhotos(folder, {}, progress);
 }
 
 std::vector<std::string> NamesOf(const Capture& capture) {
@@ -110,21 +111,20 @@ TEST(IngestPhotos, LinksToFoldersAreFollowedOnce) {
     fs::create_directory_symlink(folder / target, folder / "photos" / name);
   };
   link("elsewhere", "linked");
-  link("elsewhere", "twice");              // what "linked" leads to
-  link("elsewhere/deeper", "deeper");      // comes before "linked", which holds it
-  link("photos/own", "loop");              // read as it stands
-  link("", "up");                          // holds all this
+  link("elsewhere", "twice");          // what "linked" leads to
+  link("elsewhere/deeper", "deeper");  // comes before "linked", which holds it
+  link("photos/own", "loop");          // read as it stands
+  link("", "up");                      // holds all this
   fs::create_directory_symlink(folder / "photos", folder / "elsewhere/back");
   const Capture capture = Ingest(folder / "photos");
   EXPECT_THAT(NamesOf(capture), ElementsAre("deeper/b.jpg", "linked/a.jpg", "own/c.jpg"));
   std::vector<std::string> skipped;
   for (const Skipped& item : capture.skipped) skipped.push_back(item.name + ": " + item.reason);
-  EXPECT_THAT(skipped,
-              ElementsAre("linked/back: links to a folder that holds this one",
-                          "linked/deeper: is read already, by a link to it",
-                          "loop: links to a folder that is read already",
-                          "twice: links to a folder that is read already",
-                          "up: links to a folder that holds this one"));
+  EXPECT_THAT(skipped, ElementsAre("linked/back: links to a folder that holds this one",
+                                   "linked/deeper: is read already, by a link to it",
+                                   "loop: links to a folder that is read already",
+                                   "twice: links to a folder that is read already",
+                                   "up: links to a folder that holds this one"));
 }
 
 TEST(IngestPhotos, FoldersWithoutPhotosAreCleanErrors) {
@@ -431,11 +431,11 @@ TEST(IngestPhotos, AMaskBesideAPhotoIsItsMaskAndNoPhoto) {
   EXPECT_THAT(capture.skipped[1].reason, HasSubstr("found 32x24"));
   EXPECT_THAT(capture.skipped[2].reason, HasSubstr("dark throughout"));
   // A capture keeps it, and SfM gets it of the size that the photo has there.
-  WriteCapture(capture, folder / "capture", 2);
+  WriteCapture(capture, folder / "capture");
   const Capture read = ReadCapture(folder / "capture");
   EXPECT_EQ(ReadPhotoMask(read.photos[0]), mask);
   EXPECT_EQ(read.photos[0].mask_sha256, capture.photos[0].mask_sha256);
-  PrepareSfmImages(read, folder / "sfm", 32, 2);
+  PrepareSfmImages(read, folder / "sfm", 32);
   const Mask small = io::ReadMask(SfmMaskFile(folder / "sfm", read.photos[0]));
   EXPECT_EQ(small.width(), 32);
   EXPECT_EQ(small(5, 3), 0);

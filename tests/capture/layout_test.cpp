@@ -393,7 +393,7 @@ TEST(FieldFolders, ACopyOfAProjectGivesItsFourPhotosWithTheirMasks) {
   const fs::path folder = dtr::testing::DataFolder() / "field/project_folder/scene";
   DTR_REQUIRE_DATA(folder);
   SilentProgress progress;
-  const Capture capture = IngestPhotos(folder, {.threads = 2}, progress);
+  const Capture capture = IngestPhotos(folder, {}, progress);
   ASSERT_EQ(capture.photos.size(), 4u);
   for (const Photo& photo : capture.photos) {
     EXPECT_THAT(photo.name, HasSubstr("images/frame_0000"));
@@ -407,7 +407,7 @@ TEST(FieldFolders, AHifIsAPhotoAndVideosAreNamed) {
   const fs::path folder = dtr::testing::DataFolder() / "field/extensions";
   DTR_REQUIRE_DATA(folder);
   SilentProgress progress;
-  const Capture capture = IngestPhotos(folder, {.threads = 2}, progress);
+  const Capture capture = IngestPhotos(folder, {}, progress);
   EXPECT_EQ(capture.photos.size(), 3u);
   EXPECT_EQ(capture.contents.videos, 1);
   EXPECT_THAT(LineOf(capture.contents), HasSubstr("videos of live photos (1: .mov"));

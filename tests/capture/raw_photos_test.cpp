@@ -28,7 +28,7 @@ TEST(RawPhotos, OfOneCameraGetOneWhiteBalance) {
     WriteDng(folder / "in" / name, spec);
   }
   dtr::testing::NotedLines lines;
-  const Capture capture = IngestPhotos(folder / "in", {.threads = 2}, lines);
+  const Capture capture = IngestPhotos(folder / "in", {}, lines);
   ASSERT_EQ(capture.photos.size(), 3u);
   EXPECT_THAT(lines.lines,
               ::testing::Contains(
@@ -42,7 +42,7 @@ TEST(RawPhotos, OfOneCameraGetOneWhiteBalance) {
   ASSERT_TRUE(capture.photos[0].focal_prior_px);
   EXPECT_EQ(capture.photos[0].focal_source, "exif-35mm");
 
-  WriteCapture(capture, folder / "capture", 1);
+  WriteCapture(capture, folder / "capture");
   const Capture stored = ReadCapture(folder / "capture");
   ASSERT_EQ(stored.photos.size(), 3u);
   EXPECT_EQ(ReadPhoto(stored.photos[2]), first);

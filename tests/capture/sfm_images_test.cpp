@@ -28,7 +28,7 @@ constexpr size_t kFileLimit = 1 << 20;
 
 Capture Ingest(const fs::path& folder) {
   SilentProgress progress;
-  return IngestPhotos(folder, {.threads = 1}, progress);
+  return IngestPhotos(folder, {}, progress);
 }
 
 TEST(PrepareSfmImages, UprightPhotosKeepNamesAndBytes) {
@@ -36,7 +36,7 @@ TEST(PrepareSfmImages, UprightPhotosKeepNamesAndBytes) {
   fs::create_directories(folder / "photos/left cam");
   io::WriteImage(folder / "photos/a b.JPG", BlockPhoto(48, 32, 1));
   io::WriteImage(folder / "photos/left cam/1.png", NoisePhoto(48, 32, 2));
-  PrepareSfmImages(Ingest(folder / "photos"), folder / "sfm", 48, 2);
+  PrepareSfmImages(Ingest(folder / "photos"), folder / "sfm", 48);
   for (const char* name : {"a b.JPG", "left cam/1.png"}) {
     EXPECT_EQ(ReadFile(folder / "sfm" / name, kFileLimit),
               ReadFile(folder / "photos" / name, kFileLimit));
@@ -49,7 +49,7 @@ TEST(PrepareSfmImages, PhotosThatAreNotSrgbAreWrittenAsSrgb) {
   io::WriteImage(folder / "photos/1.png", BlockPhoto(48, 32, 1));
   io::WriteImage(folder / "photos/2.png", BlockPhoto(48, 32, 2));
   dtr::testing::InsertPngChunk(folder / "photos/1.png", "gAMA", dtr::testing::BigEndian(100000));
-  PrepareSfmImages(Ingest(folder / "photos"), folder / "sfm", 48, 2);
+  PrepareSfmImages(Ingest(folder / "photos"), folder / "sfm", 48);
   EXPECT_NE(io::ReadImage(folder / "photos/1.png"), BlockPhoto(48, 32, 1));
   EXPECT_EQ(io::ReadImage(folder / "sfm/1.png"), io::ReadImage(folder / "photos/1.png"));
 }
@@ -63,7 +63,7 @@ TEST(PrepareSfmImages, TurnedAndLargePhotosAreWrittenUprightAndSmall) {
   AddExifOrientation(folder / "photos/2.jpg", 6);
   io::WriteImage(folder / "photos/3.png", NoisePhoto(96, 64, 3));
   const Capture capture = Ingest(folder / "photos");
-  PrepareSfmImages(capture, folder / "sfm", 48, 2);
+  PrepareSfmImages(capture, folder / "sfm", 48);
   const auto header = io::ReadImageHeader(folder / "sfm/1.jpg");
   EXPECT_EQ(header.width_px, 48);
   EXPECT_EQ(header.height_px, 32);
@@ -83,7 +83,7 @@ TEST(PrepareSfmImages, OtherFormatsBecomePngUnderTheirOwnNames) {
   io::WriteImageWithAlpha(folder / "photos/x.png", NoisePhoto(20, 10, 1), Mask(20, 10, 1, 128));
   fs::rename(folder / "photos/x.png", folder / "photos/x.tif");
   const Capture capture = Ingest(folder / "photos");
-  PrepareSfmImages(capture, folder / "sfm", 0, 1);
+  PrepareSfmImages(capture, folder / "sfm", 0);
   const auto header = io::ReadImageHeader(folder / "sfm/x.tif");
   EXPECT_EQ(header.format, "png");
   EXPECT_EQ(header.channels, 3);
@@ -112,7 +112,7 @@ TEST(PrepareSfmImages, WhatColmapDoesNotReadIsEightBitColourOfTheSameLook) {
   for (const Foreign& kind : kinds) kind.write(folder / "photos" / kind.name, truth);
   const Capture capture = Ingest(folder / "photos");
   ASSERT_EQ(capture.photos.size(), std::size(kinds));
-  PrepareSfmImages(capture, folder / "sfm", 0, 2);
+  PrepareSfmImages(capture, folder / "sfm", 0);
   for (const Foreign& kind : kinds) {
     const fs::path file = folder / "sfm" / kind.name;
     const io::ImageHeader header = io::ReadImageHeader(file);
@@ -135,11 +135,11 @@ TEST(PrepareSfmImages, ASecondRunNeverWritesIntoTheOriginals) {
   io::WriteImage(folder / "photos/1.jpg", BlockPhoto(96, 64, 1));
   const std::string original = ReadFile(folder / "photos/1.jpg", kFileLimit);
   const Capture capture = Ingest(folder / "photos");
-  PrepareSfmImages(capture, folder / "sfm", 0, 1);   // links
-  PrepareSfmImages(capture, folder / "sfm", 48, 1);  // rewrites
+  PrepareSfmImages(capture, folder / "sfm", 0);   // links
+  PrepareSfmImages(capture, folder / "sfm", 48);  // rewrites
   EXPECT_EQ(io::ReadImageHeader(folder / "sfm/1.jpg").width_px, 48);
   EXPECT_EQ(ReadFile(folder / "photos/1.jpg", kFileLimit), original);
-  PrepareSfmImages(capture, folder / "sfm", 0, 1);
+  PrepareSfmImages(capture, folder / "sfm", 0);
   EXPECT_EQ(ReadFile(folder / "sfm/1.jpg", kFileLimit), original);
 }
 
@@ -149,7 +149,7 @@ TEST(PrepareSfmImages, APhotoThatVanishedIsAnError) {
   io::WriteImage(folder / "photos/1.jpg", BlockPhoto(96, 64, 1));
   const Capture capture = Ingest(folder / "photos");
   fs::remove(folder / "photos/1.jpg");
-  EXPECT_THROW(PrepareSfmImages(capture, folder / "sfm", 0, 1), Error);
+  EXPECT_THROW(PrepareSfmImages(capture, folder / "sfm", 0), Error);
 }
 
 }  // namespace

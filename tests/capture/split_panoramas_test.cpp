@@ -49,8 +49,7 @@ TEST(PanoramaView, ShowsTheColourOfEveryDirection) {
   const Panorama panorama{400, 200, 0, 0};
   for (const PanoramaFace& face : PanoramaFaces()) {
     const PinholeCamera camera = FaceCamera(FaceSizePx(width_px));
-    const PanoramaView view =
-        ViewOfPanorama(image, {}, panorama, camera, face.cam_from_panorama, 1);
+    const PanoramaView view = ViewOfPanorama(image, {}, panorama, camera, face.cam_from_panorama);
     EXPECT_TRUE(view.mask.empty());
     double worst = 0;
     for (int y = 0; y < view.image.height(); ++y) {
@@ -64,7 +63,7 @@ TEST(PanoramaView, ShowsTheColourOfEveryDirection) {
     }
     EXPECT_LT(worst, kLevels) << face.name;
     EXPECT_EQ(view.image,
-              ViewOfPanorama(image, {}, panorama, camera, face.cam_from_panorama, 3).image);
+              ViewOfPanorama(image, {}, panorama, camera, face.cam_from_panorama).image);
   }
 }
 
@@ -78,14 +77,14 @@ TEST(PanoramaView, APartOfAPanoramaIsMaskedWhereItEnds) {
   const Panorama panorama{400, 200, 100, 70};
   const PinholeCamera camera = FaceCamera(64);
   const auto front =
-      ViewOfPanorama(image, {}, panorama, camera, FaceCalled("front").cam_from_panorama, 1);
+      ViewOfPanorama(image, {}, panorama, camera, FaceCalled("front").cam_from_panorama);
   ASSERT_FALSE(front.mask.empty());
   EXPECT_EQ(front.mask(32, 32), 255);
   // tan 27 degrees of half the size above the middle, at its column.
   EXPECT_EQ(front.mask(32, 32 - 15), 255);
   EXPECT_EQ(front.mask(32, 32 - 19), 0);
   const auto back =
-      ViewOfPanorama(image, {}, panorama, camera, FaceCalled("back").cam_from_panorama, 1);
+      ViewOfPanorama(image, {}, panorama, camera, FaceCalled("back").cam_from_panorama);
   EXPECT_EQ(std::count(back.mask.data().begin(), back.mask.data().end(), 255), 0);
 }
 
@@ -95,11 +94,11 @@ class SplitPanoramasTest : public ::testing::Test {
     fs::create_directories((folder_ / "in" / name).parent_path());
     io::WritePanoramaJpeg(folder_ / "in" / name, SmoothPanorama(width_px), 95);
   }
-  Capture Ingested() { return IngestPhotos(folder_ / "in", {.threads = 1}, silent_); }
+  Capture Ingested() { return IngestPhotos(folder_ / "in", {}, silent_); }
   Capture Split(PanoramaUse use = PanoramaUse::kAuto) {
     Capture capture = Ingested();
     EXPECT_TRUE(ArePanoramas(capture, use));
-    return SplitPanoramas(capture, folder_ / "views", 1, silent_);
+    return SplitPanoramas(capture, folder_ / "views", silent_);
   }
   TemporaryFolder folder_;
   SilentProgress silent_;
@@ -123,7 +122,7 @@ TEST_F(SplitPanoramasTest, ViewsSayPanoramaAndFaceAndHaveExactCameras) {
     EXPECT_NEAR(image(image.width() / 2, image.height() / 2, 0), expected[0], 3) << photo.name;
   }
   // A capture on disk keeps what they are.
-  WriteCapture(views, folder_ / "capture", 1);
+  WriteCapture(views, folder_ / "capture");
   const Capture again = ReadCapture(folder_ / "capture");
   ASSERT_EQ(again.photos.size(), 12u);
   EXPECT_EQ(again.photos[5].face->panorama, views.photos[5].face->panorama);

@@ -10,6 +10,7 @@
 #include "capture/ingest.h"
 #include "dtr/base/error.h"
 #include "tests/capture/photo_files.h"
+#include "tests/support/on_threads.h"
 #include "tests/support/photo_kinds.h"
 #include "tests/support/test_data.h"
 
@@ -28,7 +29,7 @@ constexpr size_t kFileLimit = 1 << 20;
 
 Capture Ingest(const fs::path& folder) {
   SilentProgress progress;
-  return IngestPhotos(folder, {.threads = 1}, progress);
+  return IngestPhotos(folder, {}, progress);
 }
 
 // Photos of every kind: with EXIF, turned, in a sub-folder, one with GPS-free PNG, one skipped.
@@ -77,8 +78,8 @@ TEST(Capture, RemarksOnFilesAreStored) {
   spec.channelnames = {"R", "G", "B", "Z", "id"};
   dtr::testing::WriteForeign(folder / "photos/2.exr", spec, values);
   SilentProgress progress;
-  const Capture capture = IngestPhotos(folder / "photos", {.threads = 1}, progress);
-  WriteCapture(capture, folder / "capture", 1);
+  const Capture capture = IngestPhotos(folder / "photos", {}, progress);
+  WriteCapture(capture, folder / "capture");
   const Capture read = ReadCapture(folder / "capture");
   ASSERT_EQ(read.remarks.size(), 1u);
   EXPECT_EQ(read.remarks[0].name, "2.exr");
@@ -91,7 +92,7 @@ TEST(WriteCapture, ComesBackWithTheSameFactsAndPixels) {
   Capture capture = Ingest(folder / "photos");
   capture.photos[0].gps = io::GpsPosition{55.7, -13.2, 37.5, 4.5};
   capture.photos[1].gps = io::GpsPosition{-5.7, 13.2, std::nullopt, std::nullopt};
-  WriteCapture(capture, folder / "out/", 2);
+  WriteCapture(capture, folder / "out/");
   const Capture back = ReadCapture(folder / "out");
   ExpectSameFacts(capture, back);
   for (size_t i = 0; i < capture.photos.size(); ++i) {
@@ -106,7 +107,7 @@ TEST(WriteCapture, ComesBackWithTheSameFactsAndPixels) {
 TEST(WriteCapture, UprightPhotosKeepTheirBytes) {
   const TemporaryFolder folder;
   FillWithPhotos(folder / "photos");
-  WriteCapture(Ingest(folder / "photos"), folder / "out", 1);
+  WriteCapture(Ingest(folder / "photos"), folder / "out");
   EXPECT_EQ(ReadFile(folder / "out/images/A_b.jpg", kFileLimit),
             ReadFile(folder / "photos/A b.JPG", kFileLimit));
   EXPECT_TRUE(fs::exists(folder / "out/images/left_turned.png"));
@@ -116,8 +117,8 @@ TEST(WriteCapture, SameBytesForAnyNumberOfThreads) {
   const TemporaryFolder folder;
   FillWithPhotos(folder / "photos");
   const Capture capture = Ingest(folder / "photos");
-  WriteCapture(capture, folder / "one", 1);
-  WriteCapture(capture, folder / "four", 4);
+  OnThreads(1, [&] { return WriteCapture(capture, folder / "one"); });
+  OnThreads(4, [&] { return WriteCapture(capture, folder / "four"); });
   for (const char* file : {"capture.json", "images/left_turned.png"}) {
     EXPECT_EQ(ReadFile(folder / "one" / file, kFileLimit),
               ReadFile(folder / "four" / file, kFileLimit));
@@ -129,14 +130,14 @@ TEST(WriteCapture, LeavesWhatIsThereUnlessToldToReplaceACapture) {
   FillWithPhotos(folder / "photos");
   const Capture capture = Ingest(folder / "photos");
   SilentProgress progress;
-  EXPECT_THAT(MessageOf<UsageError>([&] { WriteCapture(capture, folder / "photos", 1); }),
+  EXPECT_THAT(MessageOf<UsageError>([&] { WriteCapture(capture, folder / "photos"); }),
               HasSubstr("something in it already"));
   EXPECT_THAT(MessageOf<UsageError>(
                   [&] { WriteCapture(capture, folder / "photos", {.replace = true}, progress); }),
               HasSubstr("no capture"));
   fs::create_directory(folder / "empty");
-  EXPECT_NO_THROW(WriteCapture(capture, folder / "empty", 1));
-  EXPECT_THROW(WriteCapture(capture, folder / "empty", 1), UsageError);
+  EXPECT_NO_THROW(WriteCapture(capture, folder / "empty"));
+  EXPECT_THROW(WriteCapture(capture, folder / "empty"), UsageError);
   EXPECT_NO_THROW(WriteCapture(capture, folder / "empty", {.replace = true}, progress));
   EXPECT_FALSE(fs::exists(folder / "empty.replaced"));
   WriteFileAtomically(folder / "empty/notes.txt", "mine");
@@ -145,7 +146,7 @@ TEST(WriteCapture, LeavesWhatIsThereUnlessToldToReplaceACapture) {
               HasSubstr("found notes.txt; move it away"));
   EXPECT_TRUE(fs::exists(folder / "empty/notes.txt"));
   WriteFileAtomically(folder / "file", "");
-  EXPECT_THROW(WriteCapture(capture, folder / "file", 1), UsageError);
+  EXPECT_THROW(WriteCapture(capture, folder / "file"), UsageError);
 }
 
 TEST(WriteCapture, APhotoThatVanishedIsAnErrorAndNothingAppears) {
@@ -153,7 +154,7 @@ TEST(WriteCapture, APhotoThatVanishedIsAnErrorAndNothingAppears) {
   FillWithPhotos(folder / "photos");
   const Capture capture = Ingest(folder / "photos");
   fs::remove(folder / "photos/left/plain.png");
-  EXPECT_THROW(WriteCapture(capture, folder / "out", 2), Error);
+  EXPECT_THROW(WriteCapture(capture, folder / "out"), Error);
   EXPECT_FALSE(fs::exists(folder / "out"));
 }
 
@@ -169,7 +170,7 @@ TEST(WriteCapture, ClearsAnUnfinishedCaptureAndNothingElse) {
   leave("out.partial/images/old.png");
   leave("out.partial/frames/frame_000001.jpg");
   leave("out.frames.partial/frame_000001.jpg");
-  EXPECT_NO_THROW(WriteCapture(capture, folder / "out", 1));
+  EXPECT_NO_THROW(WriteCapture(capture, folder / "out"));
   EXPECT_FALSE(fs::exists(folder / "out/images/old.png"));
   EXPECT_FALSE(fs::exists(folder / "out/frames"));
   EXPECT_FALSE(fs::exists(folder / "out/capture.lock"));
@@ -178,7 +179,7 @@ TEST(WriteCapture, ClearsAnUnfinishedCaptureAndNothingElse) {
   for (const char* kept :
        {"more.partial/work/lock", "more.partial/images/a.png", "more.partial/x"}) {
     leave(kept);
-    EXPECT_THAT(MessageOf<UsageError>([&] { WriteCapture(capture, folder / "more", 1); }),
+    EXPECT_THAT(MessageOf<UsageError>([&] { WriteCapture(capture, folder / "more"); }),
                 HasSubstr("expected nothing or an unfinished capture"));
     EXPECT_TRUE(fs::exists(folder / kept));
     fs::remove_all(folder / "more.partial");
@@ -194,7 +195,7 @@ TEST(WriteCapture, OneProcessAtATime) {
     CaptureWriter writer(folder / "out", {});
     EXPECT_FALSE(fs::exists(folder / "out.partial"));  // nothing is made before it is needed
     WriteFileAtomically(writer.Open() / "index.html", "a page");
-    EXPECT_THAT(MessageOf<UsageError>([&] { WriteCapture(capture, folder / "out", 1); }),
+    EXPECT_THAT(MessageOf<UsageError>([&] { WriteCapture(capture, folder / "out"); }),
                 HasSubstr("another process is writing this capture"));
     writer.Write(capture, progress);
   }
@@ -207,7 +208,7 @@ TEST(WriteCapture, AReplacementCutOffHalfWayGivesTheOldCaptureBack) {
   const TemporaryFolder folder;
   FillWithPhotos(folder / "photos");
   const Capture capture = Ingest(folder / "photos");
-  WriteCapture(capture, folder / "out", 1);
+  WriteCapture(capture, folder / "out");
   const std::string list = ReadFile(folder / "out/capture.json", kFileLimit);
   const auto mark = [&](const std::string& name) { std::ofstream(folder / name / "capture.lock"); };
   // Killed before the old one was moved aside, and between the two renames.
@@ -255,7 +256,7 @@ TEST(ReadCapture, NestingThatWouldFillTheStackIsRejected) {
 TEST(ReadCapture, EveryTruncationIsACleanError) {
   const TemporaryFolder folder;
   FillWithPhotos(folder / "photos");
-  WriteCapture(Ingest(folder / "photos"), folder / "out", 1);
+  WriteCapture(Ingest(folder / "photos"), folder / "out");
   const std::string whole = ReadFile(folder / "out/capture.json", kFileLimit);
   ASSERT_NO_THROW(CaptureFromJson(whole, "whole"));
   for (size_t length = 0; length + 1 < whole.size(); ++length) {  // the last byte is a line end
@@ -266,7 +267,7 @@ TEST(ReadCapture, EveryTruncationIsACleanError) {
 TEST(ReadCapture, NamesTheFieldThatIsWrong) {
   const TemporaryFolder folder;
   FillWithPhotos(folder / "photos");
-  WriteCapture(Ingest(folder / "photos"), folder / "out", 1);
+  WriteCapture(Ingest(folder / "photos"), folder / "out");
   const std::string whole = ReadFile(folder / "out/capture.json", kFileLimit);
   const auto message_with = [&](const std::string& from, const std::string& to) {
     std::string changed = whole;
@@ -298,7 +299,7 @@ TEST(ReadCapture, NamesTheFieldThatIsWrong) {
 TEST(IngestPhotos, SetsAndCapturesBelowThePhotosAreNoPhotos) {
   const TemporaryFolder folder;
   FillWithPhotos(folder.path());
-  WriteCapture(Ingest(folder.path()), folder / "z capture", 1);
+  WriteCapture(Ingest(folder.path()), folder / "z capture");
   fs::create_directories(folder / "scene.dtr/images");
   io::WriteImage(folder / "scene.dtr/images/1.png", NoisePhoto(8, 8, 1));
   fs::create_directories(folder / "scene2.dtr.partial/images");

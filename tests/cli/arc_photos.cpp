@@ -12,7 +12,7 @@ void MakeArcPhotos(const std::filesystem::path& folder, double noise) {
   spec.height_px = 320;
   spec.noise = noise;
   SilentProgress silent;
-  datasets::MakeDataset(spec, folder, 2, silent);
+  datasets::MakeDataset(spec, folder, silent);
 }
 
 }  // namespace dtr::testing

@@ -71,7 +71,7 @@ inline std::vector<Case> QuickOnes(const std::vector<Case>& cases) {
 /// documented table.
 inline void ExpectHoldsAsDocumented(const Case& each) {
   SilentProgress progress;
-  const Row row = RunCases({each}, {.threads = 2}, true, progress).at(0);
+  const Row row = RunCases({each}, true, progress).at(0);
   EXPECT_TRUE(row.passed()) << ToJson({row});
   std::istringstream page(ToMarkdown({row}));
   std::vector<std::string> found;

@@ -119,7 +119,7 @@ void MakeSmallCourtyard(const fs::path& folder, double scale, const Eigen::Vecto
   spec.scale = scale;
   spec.world_offset = offset;
   SilentProgress silent;
-  datasets::MakeDataset(spec, folder, 2, silent);
+  datasets::MakeDataset(spec, folder, silent);
   std::vector<CourtyardPhoto> photos;
   const PinholeCamera camera = datasets::MakeCamera(spec.width_px, spec.height_px, spec.focal_35mm);
   for (const Pose& pose : CourtyardArc(spec.views)) {

@@ -8,6 +8,7 @@
 #include "dtr/render/fill_holes.h"
 #include "dtr/render/geometry.h"
 #include "tests/cpu/render_testing.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::cpu {
 namespace {
@@ -112,11 +113,10 @@ TEST(Render, ThreadsChangeNothing) {
   const Shot novel = ShotFrom("n", {0.2, 0.1, 0}, {0, 0, 10});
   const RenderScene scene = MakeRenderScene(set);
   for (const RenderMethod method : kBothMethods) {
-    RenderOptions one = OptionsOf(method), many = one;
-    one.threads = 1;
-    many.threads = 3;
-    ExpectSameBytes(Render(scene, novel.camera, novel.cam_from_world, one),
-                    Render(scene, novel.camera, novel.cam_from_world, many));
+    const auto draw = [&] {
+      return Render(scene, novel.camera, novel.cam_from_world, OptionsOf(method));
+    };
+    ExpectSameBytes(OnThreads(1, draw), OnThreads(3, draw));
   }
 }
 
@@ -373,7 +373,6 @@ TEST(Render, SmoothsEdgesOfTheFinishedImageAlone) {
     const RenderResult with_stairs = render(options);
     options.smooth_edges = true;
     RenderResult smoothed = render(options);
-    options.threads = 3;
     ExpectSameBytes(render(options), smoothed);
     EXPECT_NE(smoothed.image, with_stairs.image);
     smoothed.image = with_stairs.image;
@@ -398,7 +397,7 @@ TEST(Render, FillsTheFinishedImageAndCountsNothingOfItAsSeen) {
   FillHoles(expected);
   options.fill_holes = true;
   for (const int threads : {1, 3}) {
-    options.threads = threads;
+    const ThreadLimit limit(threads);
     const RenderResult filled = Render(scene, novel.camera, novel.cam_from_world, options);
     ExpectSameBytes(filled, expected);
     EXPECT_EQ(filled.coverage, bare.coverage);

@@ -180,7 +180,6 @@ TEST(Render, RandomCamerasGiveNoNanAndNoInfinity) {
     options.delta_px = std::pow(10.0, random.Uniform(-3, 3));
     if (random.Index(4) == 0) options.absolute_delta = random.Uniform(0, 10);
     options.blend_in_linear_light = random.Index(2) == 0;
-    options.threads = 1;
     // Half of the time the novel camera is one of the views, exactly or nearly.
     Pose pose = random.Index(2) == 0 ? novel.cam_from_world : views[0].cam_from_world;
     if (random.Index(3) == 0) pose.translation.x() += 1e-12;

@@ -7,6 +7,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/formats/cameras_json.h"
+#include "tests/support/on_threads.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::datasets {
@@ -33,8 +34,8 @@ TEST(HardSets, PhotosAndCamerasDoNotDependOnThreads) {
   small.photos.resize(2);
   small.photos[1].exif_factor = 1.6;
   for (HardPhoto& photo : small.photos) photo.width_px = photo.height_px = 64;
-  WriteHardSet(small, folder / "a", 1);
-  WriteHardSet(small, folder / "b", 2);
+  OnThreads(1, [&] { return WriteHardSet(small, folder / "a"); });
+  OnThreads(2, [&] { return WriteHardSet(small, folder / "b"); });
   constexpr std::uintmax_t kLargest = 1 << 20;
   for (const char* file : {"photos/0000.jpg", "photos/0001.jpg", "cameras.json"}) {
     EXPECT_EQ(ReadFile(folder / "a" / file, kLargest), ReadFile(folder / "b" / file, kLargest));
@@ -46,7 +47,7 @@ TEST(HardSets, PhotosAndCamerasDoNotDependOnThreads) {
   EXPECT_LT(
       cameras[1].cam_from_world.rotation.angularDistance(small.photos[1].cam_from_world.rotation),
       1e-9);
-  EXPECT_THROW(WriteHardSet(small, folder / "a", 1), UsageError);
+  EXPECT_THROW(OnThreads(1, [&] { return WriteHardSet(small, folder / "a"); }), UsageError);
 }
 
 }  // namespace

@@ -37,7 +37,7 @@ TEST(ListDatasets, NamesEverySceneAndEveryPublicSetOnce) {
 TEST(CheckPublicSet, AcceptsTheSharedCopies) {
   DTR_REQUIRE_DATA(testing::DataFolder() / "strecha_fountain_p11");
   for (const char* set : {"strecha_fountain_p11", "chessboard_stereo_640x480"}) {
-    const DatasetCheck check = CheckPublicSet(set, testing::DataFolder() / set, 1);
+    const DatasetCheck check = CheckPublicSet(set, testing::DataFolder() / set);
     EXPECT_TRUE(check.Ok()) << set;
     EXPECT_GT(check.files_ok, 20);
   }
@@ -48,7 +48,7 @@ TEST(CheckPublicSet, NamesMissingAndChangedFiles) {
   fs::create_directory(folder / "images");
   std::ofstream(folder / "images/100_7103.JPG") << "not a photo";
   std::ofstream(folder / "notes.txt") << "not of the set";
-  const DatasetCheck check = CheckPublicSet("sceaux_castle", folder.path(), 2);
+  const DatasetCheck check = CheckPublicSet("sceaux_castle", folder.path());
   EXPECT_FALSE(check.Ok());
   EXPECT_EQ(check.files_ok, 0);
   EXPECT_EQ(check.changed, std::vector<std::string>{"images/100_7103.JPG"});

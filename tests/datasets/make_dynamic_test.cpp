@@ -32,7 +32,7 @@ DatasetSpec Toys() {
 
 void MakeSteps(const DatasetSpec& spec, const fs::path& folder) {
   SilentProgress progress;
-  MakeDataset(spec, folder, 2, progress);
+  MakeDataset(spec, folder, progress);
 }
 
 TEST(MakeDynamicDataset, WritesPhotosRigAndTruthOfEveryTimeStep) {

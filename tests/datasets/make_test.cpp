@@ -15,6 +15,7 @@
 #include "dtr/io/formats/cameras_json.h"
 #include "dtr/io/image_io.h"
 #include "dtr/types/panorama.h"
+#include "tests/support/on_threads.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::datasets {
@@ -47,7 +48,7 @@ std::map<std::string, std::string> Contents(const fs::path& folder) {
 
 void Make(const DatasetSpec& spec, const fs::path& folder, int threads = 1) {
   SilentProgress progress;
-  MakeDataset(spec, folder, threads, progress);
+  OnThreads(threads, [&] { return MakeDataset(spec, folder, progress); });
 }
 
 TEST(MakeDataset, WritesWhatItPromises) {
@@ -90,7 +91,7 @@ TEST(MakeDataset, WritesWhatItPromises) {
   for (const io::NamedCamera& camera : list.cameras) {
     const Grid<float> depth = io::ReadFloatGrid(folder / "set/depth" / camera.depth_file);
     EXPECT_EQ(std::count(depth.data().begin(), depth.data().end(), 0.0f), 0);
-    const DepthImage truth = RenderDepth(scene, camera.camera, camera.cam_from_world, 1);
+    const DepthImage truth = RenderDepth(scene, camera.camera, camera.cam_from_world);
     int equal = 0;
     for (size_t i = 0; i < depth.data().size(); ++i) {
       equal += std::abs(depth.data()[i] / truth.grid().data()[i] - 1) < 1e-6 ? 1 : 0;

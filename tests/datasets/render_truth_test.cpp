@@ -8,6 +8,7 @@
 #include "datasets/layout.h"
 #include "dtr/base/error.h"
 #include "dtr/base/random.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::datasets {
 namespace {
@@ -17,7 +18,6 @@ using Eigen::Vector3d;
 PhotoOptions Quick() {
   PhotoOptions options;
   options.supersampling = 1;
-  options.threads = 1;
   return options;
 }
 
@@ -29,8 +29,8 @@ TEST(RenderTruth, DepthCarriedToANeighbourAgreesWithItsDepth) {
   const PinholeCamera camera = MakeCamera(240, 160);
   const std::vector<Pose> poses = MakeLayout(scene, "arc", 16);
   const Pose b_from_a = poses[8] * poses[7].Inverse();
-  const DepthImage a = RenderDepth(scene, camera, poses[7], 1);
-  const DepthImage b = RenderDepth(scene, camera, poses[8], 1);
+  const DepthImage a = RenderDepth(scene, camera, poses[7]);
+  const DepthImage b = RenderDepth(scene, camera, poses[8]);
   std::vector<double> errors;
   for (int y = 0; y < a.height(); ++y) {
     for (int x = 0; x < a.width(); ++x) {
@@ -57,14 +57,15 @@ TEST(RenderTruth, PicturesDoNotDependOnTheNumberOfThreads) {
   const Scene scene = MakeScene("courtyard", 1);
   const PinholeCamera camera = MakeCamera(90, 60);
   const std::vector<Pose> poses = MakeLayout(scene, "arc", 4);
-  PhotoOptions one = Quick(), two = Quick();
-  one.noise_sigma = two.noise_sigma = 3;
-  one.lens = two.lens = {-0.1, 0.02};
-  two.threads = 2;
-  EXPECT_EQ(RenderPhoto(scene, camera, poses[1], one), RenderPhoto(scene, camera, poses[1], two));
-  EXPECT_EQ(RenderDepth(scene, camera, poses[1], 1), RenderDepth(scene, camera, poses[1], 2));
-  EXPECT_EQ(VisibilityMask(scene, camera, poses[1], poses, 2, 1),
-            VisibilityMask(scene, camera, poses[1], poses, 2, 2));
+  PhotoOptions options = Quick();
+  options.noise_sigma = 3;
+  options.lens = {-0.1, 0.02};
+  const auto photo = [&] { return RenderPhoto(scene, camera, poses[1], options); };
+  const auto depth = [&] { return RenderDepth(scene, camera, poses[1]); };
+  const auto visible = [&] { return VisibilityMask(scene, camera, poses[1], poses, 2); };
+  EXPECT_EQ(OnThreads(1, photo), OnThreads(2, photo));
+  EXPECT_EQ(OnThreads(1, depth), OnThreads(2, depth));
+  EXPECT_EQ(OnThreads(1, visible), OnThreads(2, visible));
 }
 
 TEST(RenderTruth, NoiseHasTheAskedSigmaAndNoBias) {
@@ -171,10 +172,10 @@ TEST(RenderTruth, VisibilityFollowsFromDepthMapsAwayFromEdges) {
   const PinholeCamera camera = MakeCamera(180, 120);
   const std::vector<Pose> all = MakeLayout(scene, "arc", 8);
   const std::vector<Pose> others = {all[2], all[4], all[6]};
-  const Mask mask = VisibilityMask(scene, camera, all[3], others, 2, 1);
-  const DepthImage depth = RenderDepth(scene, camera, all[3], 1);
+  const Mask mask = VisibilityMask(scene, camera, all[3], others, 2);
+  const DepthImage depth = RenderDepth(scene, camera, all[3]);
   std::vector<DepthImage> theirs;
-  for (const Pose& other : others) theirs.push_back(RenderDepth(scene, camera, other, 1));
+  for (const Pose& other : others) theirs.push_back(RenderDepth(scene, camera, other));
   int agree = 0, unseen = 0;
   for (int y = 0; y < 120; ++y) {
     for (int x = 0; x < 180; ++x) {
@@ -242,7 +243,7 @@ TEST(RenderTruth, SetHoldsConsistentViews) {
     EXPECT_GT(view.near_z, 0);
     EXPECT_GT(view.far_z, view.near_z);
     EXPECT_GT(view.reference_baseline, 0);
-    EXPECT_EQ(view.depth, RenderDepth(scene, view.camera, poses[i], 1));
+    EXPECT_EQ(view.depth, RenderDepth(scene, view.camera, poses[i]));
   }
   EXPECT_NE(set.frames[0].views[0].image, set.frames[0].views[1].image);
   EXPECT_EQ(set.frames[0].views[3].name, "0003.jpg");

@@ -6,6 +6,7 @@
 
 #include "dtr/base/error.h"
 #include "tests/eval/plane_views.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::eval {
 namespace {
@@ -125,12 +126,10 @@ TEST(CrossDepth, MapsThatAreBroughtAsMemoryAllowsGiveTheSameFigures) {
 
 TEST(CrossDepth, SameFiguresForAnyNumberOfThreads) {
   const std::vector<View> views = FourViews(true);
-  CrossDepthOptions one, three;
-  one.threads = 1;
-  three.threads = 3;
-  one.scene_center = three.scene_center = Eigen::Vector3d(0, 0, 10);
-  const CrossDepthReport a = CrossDepth(Pointers(views), one),
-                         b = CrossDepth(Pointers(views), three);
+  CrossDepthOptions options;
+  options.scene_center = Eigen::Vector3d(0, 0, 10);
+  const auto figures = [&] { return CrossDepth(Pointers(views), options); };
+  const CrossDepthReport a = OnThreads(1, figures), b = OnThreads(3, figures);
   EXPECT_EQ(a.all.median_px, b.all.median_px);
   EXPECT_EQ(a.all.p95_px, b.all.p95_px);
   EXPECT_EQ(a.all.compared, b.all.compared);

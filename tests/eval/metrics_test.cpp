@@ -8,6 +8,7 @@
 #include <opencv2/quality/qualityssim.hpp>
 
 #include "dtr/base/random.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::eval {
 namespace {
@@ -150,7 +151,8 @@ TEST(Ssim, AMaskRemovesEveryWindowItTouches) {
 
 TEST(Ssim, SameBitsForAnyNumberOfThreads) {
   const auto [clean, noisy] = NoisyPair(57, 43);
-  EXPECT_EQ(*Ssim(noisy, clean, {}, 1), *Ssim(noisy, clean, {}, 3));
+  EXPECT_EQ(*OnThreads(1, [&] { return Ssim(noisy, clean, {}); }),
+            *OnThreads(3, [&] { return Ssim(noisy, clean, {}); }));
 }
 
 TEST(ShareOf, CountsWithinTheOtherMask) {

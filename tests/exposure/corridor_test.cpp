@@ -78,7 +78,7 @@ std::vector<Vector3d> GainsOf(const std::vector<View>& views) {
       if (j != i) partners[static_cast<size_t>(i)].push_back(j);
     }
   }
-  return EstimateGains(small, partners, 2);
+  return EstimateGains(small, partners);
 }
 
 // As stereo errs on bare walls: the walls of the left half nearer in all maps, so that they agree

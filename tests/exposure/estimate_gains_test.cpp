@@ -7,6 +7,7 @@
 #include "dtr/base/random.h"
 #include "dtr/render/colour.h"
 #include "dtr/render/exposure.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr {
 namespace {
@@ -48,7 +49,7 @@ std::vector<Eigen::Vector3d> GainsOf(const std::vector<View>& views, int threads
     partners[static_cast<size_t>(i)].push_back(i + 1);
     partners[static_cast<size_t>(i) + 1].push_back(i);
   }
-  return EstimateGains(small, partners, threads);
+  return OnThreads(threads, [&] { return EstimateGains(small, partners); });
 }
 
 TEST(Exposed, KeepsBlackAndWhiteAndMultiplies) {

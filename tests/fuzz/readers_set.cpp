@@ -31,7 +31,7 @@ Reader OpenSet(const fs::path& folder) {
             // What was taken must be fit to be told of, and to be loaded or rejected.
             io::DescribeSet(read);
             io::InfoJson(read);
-            io::LoadSet(set, {.sigma = true, .held_out = true, .threads = 1});
+            io::LoadSet(set, {.sigma = true, .held_out = true});
           },
           kImageBufferBytes};
 }

@@ -13,6 +13,7 @@
 #include "dtr/io/video_frames.h"
 #include "tests/io/small_set.h"
 #include "tests/support/message_of.h"
+#include "tests/support/on_threads.h"
 #include "tests/support/test_data.h"
 #include "tests/support/truncation.h"
 
@@ -60,7 +61,9 @@ DtrSet WriteClips(const fs::path& target, const VideoQuality& quality, int threa
     }
   }
   SilentProgress silent;
-  StoreCameraVideos(writer.folder(), writer.work_folder(), set, quality, threads, 1, silent);
+  OnThreads(threads, [&] {
+    return StoreCameraVideos(writer.folder(), writer.work_folder(), set, quality, 1, silent);
+  });
   writer.Finish(set);
   return set;
 }

@@ -14,6 +14,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/random.h"
 #include "dtr/io/depth_io.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::io {
 namespace {
@@ -58,9 +59,9 @@ TEST(CodeBands, AllKindsOfMapsComeBackExactly) {
 TEST(CodeBands, AreTheSameForAnyNumberOfThreads) {
   Random random(2);
   const Codes codes = RandomCodes(random, 50, 700, 400, 0.3);
-  const std::string bytes = EncodeBands(codes, 1);
-  EXPECT_EQ(EncodeBands(codes, 4), bytes);
-  EXPECT_EQ(DecodeBands(bytes, 50, 700, 4), codes);
+  const std::string bytes = OnThreads(1, [&] { return EncodeBands(codes); });
+  EXPECT_EQ(OnThreads(4, [&] { return EncodeBands(codes); }), bytes);
+  EXPECT_EQ(OnThreads(4, [&] { return DecodeBands(bytes, 50, 700); }), codes);
 }
 
 TEST(CodeBands, SmoothSurfacesWithHolesCostAFractionOfTheirBytes) {

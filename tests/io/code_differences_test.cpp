@@ -9,6 +9,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/random.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::io {
 namespace {
@@ -61,9 +62,9 @@ TEST(CodeDifferences, BandsWithoutAChangeTakeTheirSizesAlone) {
 TEST(CodeDifferences, AreTheSameForAnyNumberOfThreads) {
   Random random(3);
   const CodeGrid base = CodesAtRandom(random, 50, 700, 0.3), codes = Changed(random, base, 0.2);
-  const std::string bytes = EncodeDifferences(codes, base, kHash, 1);
-  EXPECT_EQ(EncodeDifferences(codes, base, kHash, 4), bytes);
-  EXPECT_EQ(DecodeDifferences(bytes, base, 4), codes);
+  const std::string bytes = OnThreads(1, [&] { return EncodeDifferences(codes, base, kHash); });
+  EXPECT_EQ(OnThreads(4, [&] { return EncodeDifferences(codes, base, kHash); }), bytes);
+  EXPECT_EQ(OnThreads(4, [&] { return DecodeDifferences(bytes, base); }), codes);
 }
 
 TEST(CodeDifferences, EveryTruncatedPrefixAndEveryFlippedBitIsAnError) {

@@ -139,7 +139,6 @@ TEST(MeshFile, IsLoadedWithItsDepthAndOnlyForThatDepth) {
   writer.Finish(set);
   EXPECT_TRUE(VerifySet(folder / "small.dtr").empty());
   LoadOptions load;
-  load.threads = 1;
   std::vector<std::string> warnings;
   load.warn = [&](const std::string& line) { warnings.push_back(line); };
   DtrSet loaded = LoadSet(folder / "small.dtr", load);

@@ -331,7 +331,7 @@ TEST(ReadSet, RoundTripsEverythingExactly) {
 TEST(LoadSet, BringsThePixelsBackAndLeavesHeldOutViewsOut) {
   const TemporaryFolder folder;
   const DtrSet written = WriteSmallSet(folder / "small.dtr");
-  const DtrSet loaded = LoadSet(folder / "small.dtr", {.sigma = true, .threads = 2});
+  const DtrSet loaded = LoadSet(folder / "small.dtr", {.sigma = true});
   ASSERT_THAT(loaded.frames[0].views, SizeIs(2));
   for (size_t i = 0; i < 2; ++i) {
     const View &a = written.frames[0].views[i], &b = loaded.frames[0].views[i];

@@ -16,6 +16,7 @@
 #include "dtr/io/set_io.h"
 #include "tests/io/small_set.h"
 #include "tests/support/message_of.h"
+#include "tests/support/on_threads.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::io {
@@ -48,8 +49,10 @@ TEST(SetWriter, WritesTheSameBytesTwiceAndForAnyThreads) {
   set.frames[0].views = {SmallView(0), SmallView(1), SmallView(2, ViewRole::kHeldOut)};
   {
     SetWriter writer(folder / "b.dtr/", kFingerprint, false);  // a trailing slash changes nothing
-    ParallelFor(0, 3, 3, [&](int i) {
-      writer.WriteView(set.frames[0].views[static_cast<size_t>(i)], set.unit);
+    OnThreads(3, [&] {
+      return ParallelFor(0, 3, [&](int i) {
+        writer.WriteView(set.frames[0].views[static_cast<size_t>(i)], set.unit);
+      });
     });
     writer.WriteSparse(set, {{{{0, 0, 5}}}, {{0, 0, {1, 2}}, {1, 0, {3, 4}}}});
     writer.Finish(set);

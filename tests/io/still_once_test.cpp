@@ -11,6 +11,7 @@
 #include "dtr/io/set_io.h"
 #include "tests/io/small_set.h"
 #include "tests/support/message_of.h"
+#include "tests/support/on_threads.h"
 #include "tests/support/test_data.h"
 #include "tests/support/truncation.h"
 
@@ -74,7 +75,7 @@ DtrSet WriteMovingSet(
     }
   }
   SilentProgress silent;
-  if (once) StoreStillOnce(writer.folder(), set, threads, 1, silent);
+  if (once) OnThreads(threads, [&] { return StoreStillOnce(writer.folder(), set, 1, silent); });
   writer.Finish(set);
   return set;
 }

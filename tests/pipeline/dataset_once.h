@@ -23,7 +23,7 @@ class DatasetOnce : public ::testing::Test {
   static void Make(const datasets::DatasetSpec& spec, const std::string& name) {
     folder_ = new TemporaryFolder;
     SilentProgress silent;
-    datasets::MakeDataset(spec, *folder_ / name, 2, silent);
+    datasets::MakeDataset(spec, *folder_ / name, silent);
   }
   static void TearDownTestSuite() {
     delete folder_;

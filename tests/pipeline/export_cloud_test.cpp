@@ -13,6 +13,7 @@
 #include "tests/pipeline/off_centre.h"
 #include "tests/pipeline/read_ply.h"
 #include "tests/support/message_of.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::testing {
 namespace {
@@ -159,11 +160,9 @@ TEST_F(ExportCloud, NoiseIsAveragedByVarianceAndSigmaSaysWhatIsLeft) {
 TEST_F(ExportCloud, IsTheSameForAnyNumberOfThreadsAndLittleMemory) {
   Make({});
   pipeline::ExportRequest a = Request("a.ply"), b = Request("b.ply");
-  a.threads = 1;
-  b.threads = 3;
   b.memory_gb = 1e-6;
-  Cloud(a);
-  Cloud(b);
+  OnThreads(1, [&] { return Cloud(a); });
+  OnThreads(3, [&] { return Cloud(b); });
   EXPECT_EQ(ReadFile(a.output, 1 << 28), ReadFile(b.output, 1 << 28));
 }
 

@@ -14,6 +14,7 @@
 #include "pipeline/export.h"
 #include "tests/pipeline/exact_export.h"
 #include "tests/pipeline/read_ply.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::testing {
 namespace {
@@ -142,11 +143,10 @@ TEST_F(ExportMeshes, ArePlyOfTheSameOrInDoublesWithTheOrigin) {
 TEST_F(ExportMeshes, AreTheSameForAnyNumberOfThreadsAndLittleMemory) {
   Make({});
   pipeline::ExportRequest a = Request("a.ply"), b = Request("b.ply");
-  a.threads = 1;
-  b.threads = 3;
   b.memory_gb = 1e-5;  // some blocks: the voxel grows
   a.voxel = b.voxel = 0.2;
-  pipeline::ExportMesh(a, noted_);
+  OnThreads(1, [&] { return pipeline::ExportMesh(a, noted_); });
+  const ThreadLimit limit(3);
   EXPECT_GT(pipeline::ExportMesh(b, noted_).triangles, 0u);
   b.output = folder_ / "c.ply";
   b.memory_gb = a.memory_gb;

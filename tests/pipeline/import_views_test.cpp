@@ -13,6 +13,7 @@
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/geometry.h"
+#include "tests/support/on_threads.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::pipeline {
@@ -53,7 +54,6 @@ class ImportTest : public ::testing::Test {
     options_.images_dir = folder_ / "images";
     options_.depth_dir = folder_ / "depth";
     options_.depth_coding = DepthCoding::kExrFloat;
-    options_.threads = 2;
   }
 
   void Import(const std::string& name, const SparseScene* points = nullptr) {
@@ -146,9 +146,10 @@ TEST_F(ImportTest, GeometryIsThatOfTheLoadedSet) {
 
 TEST_F(ImportTest, BytesDoNotDependOnThreads) {
   options_.depth_coding = DepthCoding::kPng16InverseDepth;
-  options_.threads = 1;
+  std::optional<ThreadLimit> limit;
+  limit.emplace(1);
   Import("one.dtr");
-  options_.threads = 3;
+  limit.emplace(3);
   Import("three.dtr");
   int files = 0;
   for (const auto& entry : fs::recursive_directory_iterator(folder_ / "one.dtr")) {

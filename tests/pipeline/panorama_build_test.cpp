@@ -167,7 +167,7 @@ TEST_F(PanoramaBuild, ACaptureOfPanoramasKeepsWhatItsViewsAre) {
       *folder_ / "walk/panoramas", {}, capture::PanoramaUse::kAuto,
       [&] { return *folder_ / "frames"; }, silent);
   ASSERT_EQ(views.photos.size(), 6u * kPanoramas);
-  capture::WriteCapture(views, *folder_ / "views", 1);
+  capture::WriteCapture(views, *folder_ / "views");
   const auto rig = RigOfPanoramas(capture::ReadCapture(*folder_ / "views"));
   ASSERT_TRUE(rig);
   EXPECT_EQ(rig->names.size(), 6u);

@@ -88,7 +88,7 @@ TEST(UnseenPhotosOfARig, AreOfItsCamerasWithoutAPattern) {
   SilentProgress silent;
   EXPECT_THAT(
       [&] {
-        ReadTestPhotos(CalibrationOf({"a", "b"}), folder.path(), "a*", 1, silent);
+        ReadTestPhotos(CalibrationOf({"a", "b"}), folder.path(), "a*", silent);
       },
       ThrowsMessage<UsageError>(HasSubstr(
           "`pattern` a*: is for the photos of one camera; a rig's cameras are distinguished")));

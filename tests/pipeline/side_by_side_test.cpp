@@ -12,11 +12,11 @@ namespace dtr::pipeline {
 namespace {
 
 // The most items that were at work at once, of 12 that take 1 GB each.
-int AtOnce(const Room& room) {
+int AtOnce(double memory_gb) {
   SilentProgress silent;
   std::atomic<int> at_work = 0, most = 0;
   SideBySide(
-      12, "", room, [](size_t) { return 1e9; }, silent,
+      12, "", memory_gb, [](size_t) { return 1e9; }, silent,
       [&](size_t) {
         const int now = ++at_work;
         for (int seen = most; seen < now && !most.compare_exchange_weak(seen, now);) {
@@ -28,10 +28,10 @@ int AtOnce(const Room& room) {
 }
 
 TEST(SideBySide, AsManyAsHalfOfTheMemoryHoldsAndOneAlways) {
-  EXPECT_LE(AtOnce({8, 4}), 2);
-  EXPECT_EQ(AtOnce({8, 0.1}), 1);
-  EXPECT_EQ(AtOnce({1, 0}), 1);
-  EXPECT_GE(AtOnce({4, 0}), 2);
+  EXPECT_LE(OnThreads(8, [] { return AtOnce(4); }), 2);
+  EXPECT_EQ(OnThreads(8, [] { return AtOnce(0.1); }), 1);
+  EXPECT_EQ(OnThreads(1, [] { return AtOnce(0); }), 1);
+  EXPECT_GE(OnThreads(4, [] { return AtOnce(0); }), 2);
 }
 
 class Heard : public Progress {
@@ -53,13 +53,13 @@ class Heard : public Progress {
 TEST(SideBySide, TellsOfEachItemInRisingNumbersAndStopsBetweenThem) {
   const auto nothing = [](size_t) { return 0.0; };
   Heard heard;
-  SideBySide(40, "work", {4, 4}, nothing, heard, [](size_t) {});
+  SideBySide(40, "work", 4, nothing, heard, [](size_t) {});
   EXPECT_EQ(heard.total_, 40);
   ASSERT_EQ(heard.done_.size(), 40U);
   EXPECT_TRUE(std::is_sorted(heard.done_.begin(), heard.done_.end()));
   Heard stopped;
   stopped.stop_after_ = 3;
-  EXPECT_THROW(SideBySide(40, "work", {1, 4}, nothing, stopped, [](size_t) {}), Interrupted);
+  EXPECT_THROW(SideBySide(40, "work", 4, nothing, stopped, [](size_t) {}), Interrupted);
   EXPECT_EQ(stopped.done_.size(), 3U);
 }
 

@@ -53,7 +53,7 @@ class UndistortPhotosTest : public ::testing::Test {
     io::SetWriter writer(folder_ / "set.dtr", "{}", false);
     std::vector<View> views =
         UndistortPhotos(photos_, calibrated_, std::vector<bool>(kPhotos, false),
-                        {.max_size_px = kMaxSizePx, .room = {.threads = 1}}, writer, silent);
+                        {.max_size_px = kMaxSizePx, .memory_gb = 0}, writer, silent);
     for (View& view : views) {
       EXPECT_TRUE(view.image.empty()) << view.name;
       io::LoadPixels(writer.folder(), view, {});
@@ -73,8 +73,8 @@ TEST_F(UndistortPhotosTest, WhatIsWrittenIsNotReadAgainByTheNextRun) {
   const std::vector<View> second = Run();
   ASSERT_EQ(second.size(), first.size());
   for (size_t i = 0; i < first.size(); ++i) {
-    const calib::UndistortedPhoto expected = calib::Undistort(
-        Picture(static_cast<int>(i)), calibrated_.model.cameras.at(1), kMaxSizePx, 1);
+    const calib::UndistortedPhoto expected =
+        calib::Undistort(Picture(static_cast<int>(i)), calibrated_.model.cameras.at(1), kMaxSizePx);
     for (const View* view : {&first[i], &second[i]}) {
       EXPECT_EQ(view->camera, expected.camera);
       EXPECT_EQ(view->image, expected.image);
@@ -89,12 +89,12 @@ TEST_F(UndistortPhotosTest, AnotherCameraOrPoseOrADamagedImageIsDrawnAnew) {
   calibrated_.model.images[1].cam_from_world.translation.y() = 1;
   std::vector<View> views = Run();
   EXPECT_EQ(views[0].image,
-            calib::Undistort(Picture(0), calibrated_.model.cameras.at(1), kMaxSizePx, 1).image);
+            calib::Undistort(Picture(0), calibrated_.model.cameras.at(1), kMaxSizePx).image);
   EXPECT_EQ(views[1].cam_from_world.translation.y(), 1);
   calibrated_.model.cameras[1].params[0] = 50;
   views = Run();
   EXPECT_EQ(views[2].image,
-            calib::Undistort(Picture(2), calibrated_.model.cameras.at(1), kMaxSizePx, 1).image);
+            calib::Undistort(Picture(2), calibrated_.model.cameras.at(1), kMaxSizePx).image);
   fs::remove(folder_ / "p2.png");  // all is there: not looked at
   EXPECT_NO_THROW(Run());
   calibrated_.model.cameras[1].params[0] = 51;

@@ -15,6 +15,7 @@
 #include "dtr/cpu/renderer.h"
 #include "dtr/prune/probes.h"
 #include "dtr/render/scene.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::prune {
 namespace {
@@ -260,9 +261,10 @@ TEST(Prune, HeldOutPhotosAreToldOfAndDecideNothing) {
 TEST(Prune, DecidesTheSameForAnyNumberOfThreads) {
   DtrSet set = Row(4);
   PruneOptions options = SmallOptions(0.5);
-  options.render.threads = 1;
+  std::optional<ThreadLimit> limit;
+  limit.emplace(1);
   const PruneReport one = PruneWith(set, options);
-  options.render.threads = 3;
+  limit.emplace(3);
   const PruneReport three = PruneWith(set, options);
   EXPECT_EQ(one.setting.without, three.setting.without);
   EXPECT_EQ(one.setting.coding, three.setting.coding);
@@ -321,7 +323,7 @@ TEST(Prune, EveryCauseOfLossIsLogged) {
   for (const Removal& removal : report.removed) sum_db += removal.loss_db;
   FakeStore store(set);
   SilentProgress progress;
-  Mover mover(set, 1);
+  Mover mover(set);
   Notes notes(100);
   const CodeFunction code = std::ref(store);
   const RendererMaker make = [] { return &cpu::Render; };
@@ -375,7 +377,7 @@ TEST(Prune, WhatACheckTakesBackStaysOutAndLeavesRoomForOthers) {
   ASSERT_FALSE(report.removed.empty());
   for (const Removal& removal : report.removed) EXPECT_NE(removal.kind, "images");
   // What is said to have been decided is what the result loses, not what was taken back.
-  Mover mover(set, 1);
+  Mover mover(set);
   Measurer measurer(
       set, {options.probes, options.checks, options.probe_crop, options.seed, 0, options.render},
       code, make, mover, journal, progress);

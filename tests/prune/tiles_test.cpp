@@ -11,6 +11,7 @@
 #include "dtr/cpu/renderer.h"
 #include "dtr/render/frame.h"
 #include "dtr/render/scene.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::prune {
 namespace {
@@ -42,7 +43,7 @@ DtrSet Wall(int views) {
 View& ViewOf(DtrSet& set, int i) { return set.frames[0].views[static_cast<size_t>(i)]; }
 
 TilesLeftOut Redundant(const DtrSet& set, const TileRule& rule) {
-  return RedundantTiles(WhoCovers(set, {}, 2), rule);
+  return RedundantTiles(WhoCovers(set, {}), rule);
 }
 
 size_t CountOf(const TilesLeftOut& tiles) {
@@ -120,7 +121,7 @@ TEST(RedundantTiles, StayWhereOthersAreCoarser) {
 
 TEST(RedundantTiles, AreCoveredByTilesThatStay) {
   const DtrSet set = Wall(7);
-  const CoverMap map = WhoCovers(set, {}, 1);
+  const CoverMap map = WhoCovers(set, {});
   for (const int coverers : {1, 2, 3}) {
     const TilesLeftOut tiles = RedundantTiles(map, {coverers, 8});
     ASSERT_THAT(tiles, Not(IsEmpty()));
@@ -148,8 +149,12 @@ TEST(RedundantTiles, DoNotDependOnTheOrderOfTheViewsNorOnThreads) {
   DtrSet set = Wall(5);
   const TilesLeftOut tiles = Redundant(set, {2, 8});
   std::reverse(set.frames[0].views.begin(), set.frames[0].views.end());
-  EXPECT_EQ(RedundantTiles(WhoCovers(set, {}, 1), {2, 8}), tiles);
-  EXPECT_THAT(RedundantTiles(WhoCovers(set, {"viewb", "viewd"}, 1), {2, 8}),
+  EXPECT_EQ(RedundantTiles(OnThreads(1, [&] { return WhoCovers(set, {}); }), {2, 8}), tiles);
+  EXPECT_THAT(RedundantTiles(OnThreads(1,
+                                       [&] {
+                                         return WhoCovers(set, {"viewb", "viewd"});
+                                       }),
+                             {2, 8}),
               Not(Contains(Key("viewb"))));
 }
 

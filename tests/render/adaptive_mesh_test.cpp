@@ -9,6 +9,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/random.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr {
 namespace {
@@ -26,8 +27,9 @@ SampleGrid Samples(int columns, int rows, const std::function<double(int, int)>&
 
 AdaptiveMesh MeshOf(const SampleGrid& samples, int threads = 1) {
   const BreakRule rule{kBreak, std::nullopt};
-  return MakeAdaptiveMesh(samples, rule,
-                          CoverBlocks(samples.inverse_depth, rule, kTolerance, threads));
+  return MakeAdaptiveMesh(samples, rule, OnThreads(threads, [&] {
+                            return CoverBlocks(samples.inverse_depth, rule, kTolerance);
+                          }));
 }
 
 /// Hills with noise, everywhere connected: neighbours differ by less than kBreak.
@@ -173,15 +175,17 @@ TEST(AdaptiveMesh, TilesHoldEverythingOnceWithinTheirBounds) {
 TEST(AdaptiveMesh, DoesNotDependOnTheNumberOfThreads) {
   const SampleGrid samples = Samples(200, 170, Clutter);
   const BreakRule rule{kBreak, std::nullopt};
-  const BlockCover one = CoverBlocks(samples.inverse_depth, rule, kTolerance, 1);
-  const BlockCover many = CoverBlocks(samples.inverse_depth, rule, kTolerance, 5);
+  const BlockCover one =
+      OnThreads(1, [&] { return CoverBlocks(samples.inverse_depth, rule, kTolerance); });
+  const BlockCover many =
+      OnThreads(5, [&] { return CoverBlocks(samples.inverse_depth, rule, kTolerance); });
   EXPECT_EQ(one.rectangles, many.rectangles);
 }
 
 TEST(AdaptiveMesh, RejectsTheCoverOfAnotherDepthMap) {
   const SampleGrid samples = Samples(40, 40, Hills);
   const BreakRule rule{kBreak, std::nullopt};
-  const BlockCover cover = CoverBlocks(samples.inverse_depth, rule, kTolerance, 1);
+  const BlockCover cover = CoverBlocks(samples.inverse_depth, rule, kTolerance);
   EXPECT_THROW(MakeAdaptiveMesh(Samples(40, 39, Hills), rule, cover), Error);
   const auto with_hole = [](int x, int y) { return x == 16 && y == 16 ? 0 : Hills(x, y); };
   EXPECT_THROW(MakeAdaptiveMesh(Samples(40, 40, with_hole), rule, cover), Error);
@@ -200,15 +204,15 @@ TEST(AdaptiveMesh, AStoredCoverOfAnotherDepthMapIsMadeAnewAndNamed) {
     }
   };
   photograph(Hills);
-  view.mesh = MakeStoredMesh(view, {}, 1);
+  view.mesh = MakeStoredMesh(view, {});
   std::string unfit = "?";
-  const AdaptiveMesh stored = MakeAdaptiveMesh(view, {}, 1, unfit);
+  const AdaptiveMesh stored = MakeAdaptiveMesh(view, {}, unfit);
   EXPECT_EQ(unfit, "");
   photograph([](int x, int y) { return x == 16 && y == 16 ? 0 : Hills(x, y); });
-  const AdaptiveMesh anew = MakeAdaptiveMesh(view, {}, 1, unfit);
+  const AdaptiveMesh anew = MakeAdaptiveMesh(view, {}, unfit);
   EXPECT_NE(unfit, "");
   view.mesh.reset();
-  const AdaptiveMesh without = MakeAdaptiveMesh(view, {}, 1, unfit);
+  const AdaptiveMesh without = MakeAdaptiveMesh(view, {}, unfit);
   EXPECT_EQ(unfit, "");
   EXPECT_EQ(anew.indices, without.indices);
   EXPECT_NE(anew.indices, stored.indices);

@@ -48,7 +48,7 @@ TEST(FillHoles, NeverChangesWhatWasSeen) {
       }
     }
     RenderResult again = before;
-    FillHoles(again, 3);
+    FillHoles(again);
     EXPECT_EQ(again.image, result.image);
   }
 }

@@ -60,7 +60,6 @@ TEST_F(FrameMemory, OfFinishingIsWithinWhatIsStated) {
   const RenderScene scene;
   const double taken = BytesPerPixel([&](RenderResult& result) {
     RenderOptions options = WholeFrames();
-    options.threads = 1;
     FinishImage(scene, kNovel, Pose(), options, result);
   });
   EXPECT_LE(taken, Stated());

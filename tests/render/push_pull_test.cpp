@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "dtr/base/random.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr {
 namespace {
@@ -28,10 +29,12 @@ Known RandomImage(int width, int height, double hole_share, Random& random) {
 }
 
 PushPull Filled(const Known& known, int threads = 1) {
-  return PushPull(HolePyramid(known.hole), threads, [&](int x, int y) {
-    if (known.hole(x, y) != 0) return PushPull::Cell{};
-    const double value = known.value(x, y);
-    return PushPull::Cell{1, {value, 1 - value, 0.5, 2 * value}};
+  return OnThreads(threads, [&] {
+    return PushPull(HolePyramid(known.hole), [&](int x, int y) {
+      if (known.hole(x, y) != 0) return PushPull::Cell{};
+      const double value = known.value(x, y);
+      return PushPull::Cell{1, {value, 1 - value, 0.5, 2 * value}};
+    });
   });
 }
 
@@ -88,7 +91,7 @@ TEST(PushPull, AHoleTakesItsNeighboursWithEqualWeights) {
   // A single coarse cell, the mean of the three seen pixels, one of them ten times as near.
   Mask hole(2, 2);
   hole(1, 1) = kHole;
-  const PushPull filled(HolePyramid(hole), 1, [&](int x, int y) {
+  const PushPull filled(HolePyramid(hole), [&](int x, int y) {
     if (hole(x, y) != 0) return PushPull::Cell{};
     const bool near = x == 0 && y == 0;
     return PushPull::Cell{1, {near ? 0.9 : 0, near ? 0 : 0.6, 0.3, near ? 1 : 0.1}};

@@ -7,6 +7,7 @@
 
 #include "dtr/base/random.h"
 #include "dtr/render/colour.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr {
 namespace {
@@ -33,7 +34,7 @@ struct Painted {
   ImageRgb8 Smoothed(std::span<const Eigen::Vector3d> centres, bool filled = true,
                      int threads = 1) const {
     RenderResult smoothed = result;
-    SmoothEdges(kNovel, centres, filled, threads, smoothed);
+    OnThreads(threads, [&] { return SmoothEdges(kNovel, centres, filled, smoothed); });
     EXPECT_EQ(smoothed.depth, result.depth);
     EXPECT_EQ(smoothed.coverage, result.coverage);
     return smoothed.image;

@@ -13,6 +13,7 @@
 #include "dtr/render/geometry.h"
 #include "dtr/render/time_steps.h"
 #include "dtr/render/valid_views.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr {
 namespace {
@@ -87,7 +88,6 @@ std::vector<std::string> Expected(Disk& disk, const Pose& camera, const RenderOp
 ViewStream::Settings Room(size_t bytes, std::vector<std::string>* warnings = nullptr) {
   ViewStream::Settings settings;
   settings.host_bytes = bytes;
-  settings.threads = 2;
   settings.warn = [warnings](const std::string& line) {
     if (warnings != nullptr) warnings->push_back(line);
   };
@@ -205,7 +205,7 @@ TEST(ViewStream, GivesTheSameForAnyThreadsRoomAndHistory) {
     for (const size_t views : {3u, 5u, 12u}) {
       Disk disk;
       ViewStream::Settings settings = Room(views * disk.view_bytes);
-      settings.threads = threads;
+      const ThreadLimit limit(threads);
       const std::vector<std::string> sound = Expected(disk, disk.Camera(0), Nearest(kViews));
       disk.broken[sound[4]] = "gone";
       Disk without;

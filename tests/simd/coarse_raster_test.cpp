@@ -9,6 +9,7 @@
 #include "dtr/simd/coarse_raster.h"
 #include "tests/simd/parity_scenes.h"
 #include "tests/support/instruction_sets.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::testing {
 namespace {
@@ -21,7 +22,7 @@ struct Placed {
   Placed(const DtrSet& set, const PinholeCamera& novel, const Pose& novel_from_world) {
     for (const View& view : set.frames[0].views) {
       std::string unfit;
-      meshes.push_back(MakeAdaptiveMesh(view, RenderOptions{}, 1, unfit));
+      meshes.push_back(MakeAdaptiveMesh(view, RenderOptions{}, unfit));
     }
     for (size_t i = 0; i < meshes.size(); ++i) {
       const View& view = set.frames[0].views[i];
@@ -34,7 +35,7 @@ struct Placed {
 std::vector<float> Raster(const std::vector<simd::PlacedMesh>& placed, const PinholeCamera& novel,
                           int threads) {
   simd::CoarseRaster raster;
-  raster.Draw(placed, novel.width_px(), {0, novel.height_px()}, threads);
+  OnThreads(threads, [&] { return raster.Draw(placed, novel.width_px(), {0, novel.height_px()}); });
   return raster.nearest();
 }
 

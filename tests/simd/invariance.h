@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "tests/simd/parity_scenes.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::testing {
 
@@ -72,7 +73,7 @@ class InvarianceOf {
  private:
   RenderResult Draw(const DtrSet& set, const Shot& novel, int threads = 0) {
     RenderOptions options = OptionsOf(method_);
-    options.threads = threads;
+    const ThreadLimit limit(threads);
     Renderer renderer;
     return renderer.Render(MakeRenderScene(set), novel.camera, novel.cam_from_world, options);
   }

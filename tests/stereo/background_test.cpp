@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dtr/base/random.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::stereo {
 namespace {
@@ -51,7 +52,7 @@ TEST(Background, NoiseIsThatOfTheImagesWhateverMoves) {
     // blocks that the square leaves or reaches: the median is at most the 0.533 quantile of those
     // that stand still, which is 1.08 times the median. That of 7000 blocks is sure to 1 %.
     const double expected = std::sqrt(noise * noise + 1.0 / 12);
-    const double found = NoiseOverTime({images, {}}, 2);
+    const double found = NoiseOverTime({images, {}});
     EXPECT_GT(found, 0.98 * expected) << noise;
     EXPECT_LT(found, 1.10 * expected) << noise;
   }
@@ -59,7 +60,7 @@ TEST(Background, NoiseIsThatOfTheImagesWhateverMoves) {
 
 TEST(Background, IsTheWallWithoutWhatMoves) {
   const auto images = Walls(1.5, 4);
-  const Background background = FindBackground({images, {}}, 2);
+  const Background background = FindBackground({images, {}});
   Random still(1);
   const ImageRgb8 wall = Wall(-100, 0, still);
   double squares = 0;
@@ -80,10 +81,10 @@ TEST(Background, IsTheWallWithoutWhatMoves) {
 
 TEST(Background, ChangedIsWhatWindowsWithTheObjectShow) {
   const auto images = Walls(1.5, 5);
-  const Background background = FindBackground({images, {}}, 2);
+  const Background background = FindBackground({images, {}});
   int missed = 0, false_alarms = 0, far = 0;
   for (int step = 0; step < kSteps; ++step) {
-    const Mask changed = ChangedPixels(images[static_cast<size_t>(step)], {}, background, 2);
+    const Mask changed = ChangedPixels(images[static_cast<size_t>(step)], {}, background);
     const int left = 5 * step;
     for (int y = 0; y < kHeight; ++y) {
       for (int x = 0; x < kWidth; ++x) {
@@ -108,10 +109,10 @@ TEST(Background, PixelsThatShowSomethingElseEveryTimeAreUnknownAndChanged) {
     for (int c = 0; c < 3; ++c) image(30, 20, c) = Level(20.0 * step);
     images.push_back(image);
   }
-  const Background background = FindBackground({images, {}}, 1);
+  const Background background = FindBackground({images, {}});
   EXPECT_EQ(background.support(30, 20), 0);
   EXPECT_EQ(background.support(40, 20), kSteps);
-  const Mask changed = ChangedPixels(images.front(), {}, background, 1);
+  const Mask changed = ChangedPixels(images.front(), {}, background);
   EXPECT_NE(changed(30, 20), 0);
   EXPECT_NE(changed(33, 23), 0);  // its window holds that pixel
   EXPECT_EQ(changed(34, 20), 0);
@@ -121,29 +122,36 @@ TEST(Background, MaskedPixelsSayNothing) {
   const auto images = Walls(0.5, 6);
   std::vector<Mask> masks(images.size(), Mask(kWidth, kHeight, 1, 255));
   for (Mask& mask : masks) mask(8, 8) = 0;
-  const Background background = FindBackground({images, masks}, 1);
+  const Background background = FindBackground({images, masks});
   EXPECT_EQ(background.support(8, 8), 0);
   Mask usable(kWidth, kHeight, 1, 255);
   usable(8, 8) = 0;
   Random random(1);
-  const Mask changed = ChangedPixels(Wall(-100, 0.5, random), usable, background, 1);
+  const Mask changed = ChangedPixels(Wall(-100, 0.5, random), usable, background);
   EXPECT_EQ(changed(8, 8), 0);
 }
 
 TEST(Background, DoesNotDependOnThreads) {
   const auto images = Walls(2, 7);
-  const Background one = FindBackground({images, {}}, 1), four = FindBackground({images, {}}, 4);
+  const Background one = OnThreads(1,
+                                   [&] {
+                                     return FindBackground({images, {}});
+                                   }),
+                   four = OnThreads(4, [&] {
+                     return FindBackground({images, {}});
+                   });
   EXPECT_EQ(one.image, four.image);
   EXPECT_EQ(one.support, four.support);
   EXPECT_EQ(one.noise, four.noise);
-  EXPECT_EQ(ChangedPixels(images[3], {}, one, 1), ChangedPixels(images[3], {}, one, 4));
+  EXPECT_EQ(OnThreads(1, [&] { return ChangedPixels(images[3], {}, one); }),
+            OnThreads(4, [&] { return ChangedPixels(images[3], {}, one); }));
 }
 
 TEST(Background, RejectsImagesThatDoNotGoTogether) {
   std::vector<ImageRgb8> images{ImageRgb8(8, 8, 3), ImageRgb8(8, 9, 3)};
-  EXPECT_THROW(FindBackground({images, {}}, 1), std::invalid_argument);
+  EXPECT_THROW(FindBackground({images, {}}), std::invalid_argument);
   images.clear();
-  EXPECT_THROW(FindBackground({images, {}}, 1), std::invalid_argument);
+  EXPECT_THROW(FindBackground({images, {}}), std::invalid_argument);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "datasets/exact/analytic_scene.h"
 #include "stereo/complete/expand.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::stereo {
 namespace {
@@ -69,11 +70,12 @@ struct Row {
   }
 
   std::vector<DepthImage> Completed(int threads) const {
+    const ThreadLimit limit(threads);
     std::vector<CellView> cells;
     for (const View& view : views) cells.push_back(MakeCells(view));
     SilentProgress silent;
-    const auto completed = CompleteCells(
-        cells, neighbours, PlanesToChoose(cells, neighbours, threads), threads, silent);
+    const auto completed =
+        CompleteCells(cells, neighbours, PlanesToChoose(cells, neighbours), silent);
     std::vector<DepthImage> depths;
     for (size_t i = 0; i < views.size(); ++i) {
       depths.push_back(ExpandCells(views[i], cells[i], completed[i], kFarZ));

@@ -9,6 +9,7 @@
 
 #include "datasets/exact/stereo_scene.h"
 #include "stereo/left_out.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::stereo {
 namespace {
@@ -115,10 +116,9 @@ Row Cameras(int count) {
   return row;
 }
 
-DepthMapsOptions Options(int neighbours, int threads, int min_agreeing = 1) {
+DepthMapsOptions Options(int neighbours, int min_agreeing = 1) {
   DepthMapsOptions options;
   options.neighbours.count = neighbours;
-  options.engine.threads = threads;
   options.consistency.min_agreeing = min_agreeing;
   return options;
 }
@@ -144,7 +144,8 @@ Results Compute(const Row& row, const Engine& engine, const DepthMapsOptions& op
 TEST(ComputeDepthMaps, PairsWithoutCommonPointsAreLeftOutAndCounted) {
   WallEngine engine;
   Recorder all_share;
-  Compute(Cameras(4), engine, Options(2, 1), all_share);
+  const ThreadLimit limit(1);
+  Compute(Cameras(4), engine, Options(2), all_share);
   EXPECT_TRUE(all_share.notes.empty());
   // The last of four sees points of its own alone, and would have no neighbour: it is told apart.
   Row row = Cameras(4);
@@ -152,7 +153,7 @@ TEST(ComputeDepthMaps, PairsWithoutCommonPointsAreLeftOutAndCounted) {
     return (seen.view == 3) != (seen.point >= 40);
   });
   Recorder some_do_not;
-  Compute(row, engine, Options(2, 1), some_do_not);
+  Compute(row, engine, Options(2), some_do_not);
   ASSERT_EQ(some_do_not.notes.size(), 2u);
   EXPECT_EQ(some_do_not.notes[0],
             "6 of 12 pairs of view and neighbour left out: they have no more than 3 points in "
@@ -163,20 +164,22 @@ TEST(ComputeDepthMaps, PairsWithoutCommonPointsAreLeftOutAndCounted) {
 TEST(ComputeDepthMaps, ViewsWhoseTextureSufficesAreCounted) {
   const CountingEngine engine;
   Recorder progress;
-  Compute(Cameras(4), engine, Options(2, 1), progress);
+  const ThreadLimit limit(1);
+  Compute(Cameras(4), engine, Options(2), progress);
   ASSERT_EQ(progress.notes.size(), 1u);
   EXPECT_EQ(progress.notes[0],
             "planes on weak texture left out in 2 of 4 views: their texture suffices");
   // Only what this call left out is told.
   Recorder again;
-  Compute(Cameras(4), engine, Options(2, 1), again);
+  Compute(Cameras(4), engine, Options(2), again);
   EXPECT_TRUE(again.notes.empty());
 }
 
 TEST(ComputeDepthMaps, HandsOutEveryViewOnceWithWrongPixelsRemoved) {
   WallEngine engine;
   Recorder progress;
-  const Results results = Compute(Cameras(5), engine, Options(2, 2), progress);
+  const ThreadLimit limit(2);
+  const Results results = Compute(Cameras(5), engine, Options(2), progress);
   ASSERT_EQ(results.size(), 5u);
   for (int v = 0; v < 5; ++v) {
     EXPECT_EQ(results[static_cast<size_t>(v)].first, v);
@@ -192,11 +195,13 @@ TEST(ComputeDepthMaps, ResumesToTheSameBytesAndComputesOnlyWhatIsNeeded) {
   WallEngine engine;
   Recorder progress;
   const Row row = Cameras(8);
-  const DepthMapsOptions options = Options(2, 1);
+  const ThreadLimit limit(1);
+  const DepthMapsOptions options = Options(2);
   const Results all = Compute(row, engine, options, progress);
   engine.calls = 0;
+  const ThreadLimit now(4);
   const Results last =
-      Compute(row, engine, Options(2, 4), progress, [](int view) { return view != 7; });
+      Compute(row, engine, Options(2), progress, [](int view) { return view != 7; });
   ASSERT_EQ(last.size(), 1u);
   EXPECT_EQ(last[0].first, 7);
   EXPECT_EQ(last[0].second.depth, all[7].second.depth);
@@ -206,7 +211,8 @@ TEST(ComputeDepthMaps, ResumesToTheSameBytesAndComputesOnlyWhatIsNeeded) {
 TEST(ComputeDepthMaps, WithoutTheFilterNothingIsRemoved) {
   WallEngine engine;
   Recorder progress;
-  const Results results = Compute(Cameras(3), engine, Options(5, 2, 0), progress);
+  const ThreadLimit limit(2);
+  const Results results = Compute(Cameras(3), engine, Options(5, 0), progress);
   EXPECT_EQ(results[0].second.depth(5, 10), 2);
 }
 
@@ -225,7 +231,8 @@ TEST(ComputeDepthMaps, StopsBetweenViewsWhenAsked) {
   WallEngine engine;
   Recorder progress;
   progress.stop_after = 2;
-  EXPECT_THROW(Compute(Cameras(6), engine, Options(5, 1), progress), Interrupted);
+  const ThreadLimit limit(1);
+  EXPECT_THROW(Compute(Cameras(6), engine, Options(5), progress), Interrupted);
   EXPECT_EQ(engine.calls, 2);
 }
 
@@ -246,7 +253,8 @@ TEST(RunRounds, ARoundReadsOnlyTheRoundBefore) {
   RoundsEngine engine;
   Recorder progress;
   const Row row = Cameras(3);
-  const Results results = Compute(row, engine, Options(2, 4, 0), progress);
+  const ThreadLimit limit(4);
+  const Results results = Compute(row, engine, Options(2, 0), progress);
   ASSERT_EQ(results.size(), 3u);
   // By hand: w0 = 0.250, 0.251, 0.252; each round w_i += 0.1 (sum of the others).
   double w[3] = {0.250, 0.251, 0.252};
@@ -262,10 +270,11 @@ TEST(RunRounds, GoesOnFromWhatTheStoreHasToTheSameBytes) {
   RoundsEngine engine;
   Recorder progress;
   const Row row = Cameras(4);
-  const Results undisturbed = Compute(row, engine, Options(2, 1, 0), progress);
+  const ThreadLimit limit(1);
+  const Results undisturbed = Compute(row, engine, Options(2, 0), progress);
   engine.calls = 0;
   PlaneMapsInMemory planes;
-  DepthMapsOptions options = Options(2, 1, 0);
+  DepthMapsOptions options = Options(2, 0);
   options.planes = &planes;
   Recorder impatient;
   impatient.stop_after = 3;  // of the first round
@@ -283,7 +292,8 @@ TEST(RunRounds, AViewWithoutAPairHasNoPlanesForItsNeighboursEither) {
   RoundsEngine engine;
   engine.reject = 1;
   Recorder progress;
-  const Results results = Compute(Cameras(4), engine, Options(3, 1, 0), progress);
+  const ThreadLimit limit(1);
+  const Results results = Compute(Cameras(4), engine, Options(3, 0), progress);
   EXPECT_TRUE(DepthImage::IsHole(results[1].second.depth(32, 24)));
   EXPECT_FALSE(DepthImage::IsHole(results[0].second.depth(32, 24)));
   EXPECT_EQ(progress.notes.size(), 1u);
@@ -297,7 +307,7 @@ DepthEstimate FilteredAgainst(float other_z, double tolerance_px) {
   for (float& z : mine.depth.grid().data()) z = kWallZ;
   for (float& z : other.depth.grid().data()) z = other_z;
   const OtherDepth others[] = {{&b, &other}};
-  return FilterByConsistency(a, mine, others, {.min_agreeing = 1, .tolerance_px = tolerance_px}, 2);
+  return FilterByConsistency(a, mine, others, {.min_agreeing = 1, .tolerance_px = tolerance_px});
 }
 
 TEST(FilterByConsistency, KeepsWhatTheOtherMapConfirmsWithinTheTolerance) {
@@ -327,7 +337,7 @@ TEST(FilterByConsistency, DoubtsWhatItKeepsAlthoughAMapRefutesIt) {
   for (float& z : nearer.depth.grid().data()) z = 0.5f * kWallZ;
   const auto sigma = [&](const DepthEstimate& other) {
     const OtherDepth others[] = {{&b, &same}, {&c, &other}};
-    return FilterByConsistency(a, mine, others, {.min_agreeing = 1, .tolerance_px = 1}, 2)
+    return FilterByConsistency(a, mine, others, {.min_agreeing = 1, .tolerance_px = 1})
         .inverse_depth_sigma(32, 24);
   };
   EXPECT_FLOAT_EQ(sigma(same), 0.01f);

@@ -11,6 +11,7 @@
 
 #include "datasets/exact/stereo_quality.h"
 #include "stereo/depth_maps.h"
+#include "tests/support/on_threads.h"
 #include "tests/support/test_data.h"
 
 namespace {
@@ -148,7 +149,7 @@ class MemoryLimit : public ::testing::Test {
     for (int v = 0; v < kViews; ++v) disk.SavePixels(v, images_[static_cast<size_t>(v)]);
     DepthMapsOptions options;
     options.neighbours.count = engine.Neighbours();
-    options.engine.threads = threads;
+    const ThreadLimit limit(threads);
     options.planes = &disk;
     options.estimates = &disk;
     options.load_pixels = [&](int view) { return disk.Pixels(view); };

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "dtr/base/parallel_for.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::stereo {
 namespace {
@@ -91,7 +92,7 @@ TEST_F(PagesTest, SeveralThreadsLoadAPageOnceAndWhatFailedAgain) {
       ++failures;
     }
   };
-  ParallelFor(0, 40, 8, get);
+  OnThreads(8, [&] { return ParallelFor(0, 40, get); });
   EXPECT_EQ(failures, 1);
   EXPECT_EQ(loads, 6);
   EXPECT_EQ(pages.held(), 50u);

@@ -11,6 +11,7 @@
 #include "dtr/base/random.h"
 #include "dtr/eval/sigma_scores.h"
 #include "tests/support/instruction_sets.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::stereo {
 namespace {
@@ -40,7 +41,7 @@ std::vector<Shot> Shots(const testing::Surface& surface, const std::vector<Pose>
 
 DepthEstimate EstimateFirst(const std::vector<StereoView>& views, const DepthRange& range = kRange,
                             int threads = 2) {
-  return testing::EstimateFirstBy("patchmatch", views, range, threads);
+  return OnThreads(threads, [&] { return testing::EstimateFirstBy("patchmatch", views, range); });
 }
 
 Quality QualityOf(const DepthEstimate& estimate, const DepthImage& truth) {
@@ -90,8 +91,7 @@ TEST(PatchMatchEngine, FindsWhatOneNeighbourAloneSees) {
               Facing({kLeft - 0.1, 0.1, 0}), Facing({kLeft, -0.2, 0}), Facing({kLeft, 0.2, 0})});
   const auto views = ViewsOf(shots);
   const PlaneMap planes =
-      MakeEngine("patchmatch")
-          ->Match(views, 0, std::vector{1, 2, 3, 4, 5}, {2.5, 8}, {.threads = 2});
+      MakeEngine("patchmatch")->Match(views, 0, std::vector{1, 2, 3, 4, 5}, {2.5, 8}, {});
   // Where the edge as seen from x lies on the far wall, and that in pixels of the first view.
   const auto behind = [&](double x) {
     const double far_x = x + (kEdge - x) * kFar / kNear;
@@ -188,18 +188,17 @@ DepthEstimate AfterRounds(const std::vector<StereoView>& views, int threads = 2)
   std::vector<PlaneMap> maps, next;
   std::vector<const PlaneMap*> known(views.size());
   for (int v = 0; v < count; ++v) {
-    maps.push_back(engine->Match(views, v, others(v), kRange, {.threads = threads}));
+    maps.push_back(engine->Match(views, v, others(v), kRange, {}));
   }
   for (int round = 1; round <= engine->Rounds(); ++round, maps = std::move(next)) {
     for (size_t v = 0; v < views.size(); ++v) known[v] = &maps[v];
     next.clear();
     for (int v = 0; v < count; ++v) {
-      next.push_back(
-          engine->Refine(views, v, others(v), kRange, known, round, {.threads = threads}));
+      next.push_back(engine->Refine(views, v, others(v), kRange, known, round, {}));
     }
   }
   for (size_t v = 0; v < views.size(); ++v) known[v] = &maps[v];
-  return engine->Filter(views, 0, others(0), kRange, known, {.threads = threads});
+  return engine->Filter(views, 0, others(0), kRange, known, {});
 }
 
 /// The sphere from the first `count` of: the middle, right, left, below, above.
@@ -449,7 +448,7 @@ TEST(PatchMatchEngine, PlanesAreFittedToWeakTextureAndLeftOutWhereItSuffices) {
   const PatchMatchEngine engine;
   const auto without_planes = [&] {
     const int before = engine.without_planes();
-    engine.Estimate(ViewsOf(shots), 0, std::vector{1, 2, 3, 4}, kRange, {.threads = 2});
+    engine.Estimate(ViewsOf(shots), 0, std::vector{1, 2, 3, 4}, kRange, {});
     return engine.without_planes() - before;
   };
   EXPECT_EQ(without_planes(), 1);

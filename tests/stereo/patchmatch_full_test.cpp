@@ -29,7 +29,7 @@ TEST(PatchMatchFull, TwoPicturesOfTwelveMegapixels) {
   }
   const auto views = testing::ViewsOf(shots);
   const std::int64_t before = PeakBytes();
-  const DepthEstimate estimate = testing::EstimateFirstBy("patchmatch", views, {2.5, 8}, 2);
+  const DepthEstimate estimate = testing::EstimateFirstBy("patchmatch", views, {2.5, 8});
   const double bytes_per_pixel = static_cast<double>(PeakBytes() - before) / 12e6;
   const testing::Score score = testing::ScoreFirst(views, estimate, shots[0].truth);
   EXPECT_GT(score.kept, 0.95);

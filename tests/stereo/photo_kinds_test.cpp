@@ -18,7 +18,7 @@ TEST(PhotoKinds, GreySixteenBitAndAlphaPhotosGiveTheDepthOfEightBitColour) {
   std::vector<Shot> shots =
       testing::ShotsOf(testing::Slanted(), camera, {Facing({0, 0, 0}), Facing({0.4, 0, 0})});
   const auto estimate = [&] {
-    return testing::EstimateFirstBy("patchmatch", testing::ViewsOf(shots), {2.5, 8}, 2);
+    return testing::EstimateFirstBy("patchmatch", testing::ViewsOf(shots), {2.5, 8});
   };
   const DepthEstimate expected = estimate();
   const std::vector<Shot> originals = shots;

@@ -8,6 +8,7 @@
 #include "dtr/base/random.h"
 #include "stereo/depth_prior.h"
 #include "stereo/prior_agreement.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::stereo {
 namespace {
@@ -249,7 +250,7 @@ class HalfPlainWall : public ::testing::Test {
                    {{1}, {kNoise}}};
       views[v].prior = &priors[v];
     }
-    return testing::WholeRun(views, {2, 9}, threads);
+    return OnThreads(threads, [&] { return testing::WholeRun(views, {2, 9}); });
   }
   /// Shares of the true pixels, in the plain or the textured part.
   struct Shares {

@@ -7,6 +7,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "datasets/exact/stereo_quality.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::stereo {
 namespace {
@@ -38,7 +39,7 @@ std::vector<Shot> Shots(const testing::Surface& surface, const std::vector<Pose>
 
 DepthEstimate EstimateFirst(const std::vector<StereoView>& views, const DepthRange& range = kRange,
                             int threads = 2) {
-  return testing::EstimateFirstBy("sgbm", views, range, threads);
+  return OnThreads(threads, [&] { return testing::EstimateFirstBy("sgbm", views, range); });
 }
 
 Quality QualityOf(const DepthEstimate& estimate, const DepthImage& truth) {

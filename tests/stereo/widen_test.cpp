@@ -35,8 +35,7 @@ class WidenedRanges : public ::testing::Test {
   std::vector<DepthRange> Widen(const DepthRange& range, int most) {
     const std::vector<DepthRange> ranges(views_.size(), range);
     Pages pages;
-    return Widened({views_, neighbours_, ranges, engine_.get(), {.threads = 2}, {}, &pages}, most,
-                   notes_);
+    return Widened({views_, neighbours_, ranges, engine_.get(), {}, {}, &pages}, most, notes_);
   }
   std::pair<double, double> TrueRange() const {
     double near_z = 1e9, far_z = 0;

@@ -4,6 +4,7 @@
 
 #include "datasets/exact/analytic_scene.h"
 #include "dtr/cpu/renderer.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::viewer {
 namespace {
@@ -29,7 +30,6 @@ class WireframeTest : public ::testing::Test {
     scene_ = MakeRenderScene(set_);
     const View& first = set_.frames[0].views[0];
     novel_ = {first.camera, first.cam_from_world};
-    options_.threads = 1;
   }
   RenderResult Rendered() const {
     return cpu::Render(scene_, novel_.camera, novel_.cam_from_world, options_);
@@ -85,9 +85,9 @@ TEST_F(WireframeTest, HidesWhatLiesBehindTheSurfaceAndWhereNothingIsSeen) {
 
 TEST_F(WireframeTest, HasTheSameBytesForAnyNumberOfThreadsAndWhenMeshesAreKept) {
   const RenderResult result = Rendered();
-  const ImageRgb8 one = Drawn(result);
+  const ImageRgb8 one = OnThreads(1, [&] { return Drawn(result); });
   EXPECT_EQ(Drawn(result).data(), one.data());
-  options_.threads = 3;
+  const ThreadLimit limit(3);
   EXPECT_EQ(Wireframe().Draw({result, scene_, novel_, options_, colours_}).data(), one.data());
 }
 

@@ -57,9 +57,7 @@ void RenderControls(Widgets& widgets, RenderOptions& options, const RenderOption
   widgets.Check("fill holes", options.fill_holes);
   widgets.Check("smooth edges", options.smooth_edges);
   if (widgets.Button("defaults")) {
-    const int threads = options.threads;
     options = defaults;
-    options.threads = threads;
   }
 }
 

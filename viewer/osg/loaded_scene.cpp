@@ -79,7 +79,7 @@ std::shared_ptr<const LoadedSet> MakeSet(dtr::DtrSet set) {
   }
   if (loaded->time_steps.empty()) throw dtr::Error("set: expected at least one frame, found none");
   std::vector<osg::BoundingBox> bounds(views.size());
-  dtr::ParallelFor(0, static_cast<int>(bounds.size()), 0, [&](int i) {
+  dtr::ParallelFor(0, static_cast<int>(bounds.size()), [&](int i) {
     const auto k = static_cast<size_t>(i);
     bounds[k] = BoundsOf(*views[k]);
   });

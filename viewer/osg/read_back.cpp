@@ -171,7 +171,7 @@ RenderResult RenderByReadBack(gl::Renderer& renderer, const RenderScene& scene,
     const auto rank = std::find(selection.views.begin(), selection.views.end(), index);
     views.back().cut_factor = cuts[static_cast<size_t>(rank - selection.views.begin())];
   }
-  ParallelFor(0, novel.height_px(), options.threads, [&](int y) {
+  ParallelFor(0, novel.height_px(), [&](int y) {
     PixelBlender blender(scene, novel, two_pass, selection.per_pixel, views);
     for (int x = 0; x < novel.width_px(); ++x) blender.Blend(x, y, result);
   });

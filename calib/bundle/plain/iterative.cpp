@@ -17,16 +17,14 @@ constexpr ConjugateGradientsOptions kOptions{.gain = 0.1, .max_iterations = 500}
 template <int kCamera>
 class SchurComplement {
  public:
-  SchurComplement(const Problem& problem, const Layout& layout, const NormalEquations& normal,
-                  int threads)
+  SchurComplement(const Problem& problem, const Layout& layout, const NormalEquations& normal)
       : problem_(problem),
         layout_(layout),
         normal_(normal),
-        threads_(threads),
         sums_(kParts, VectorXd(layout.unknowns())) {}
 
   VectorXd Times(const VectorXd& x) {
-    ParallelFor(0, kParts, threads_, [&](int part) {
+    ParallelFor(0, kParts, [&](int part) {
       VectorXd& sum = sums_[static_cast<size_t>(part)];
       sum.setZero();
       const size_t points = problem_.points(), k = static_cast<size_t>(part);
@@ -122,15 +120,14 @@ class SchurComplement {
   const Problem& problem_;
   const Layout& layout_;
   const NormalEquations& normal_;
-  const int threads_;
   std::vector<VectorXd> sums_;
   std::vector<Eigen::LLT<Eigen::MatrixXd>> inverse_;
 };
 
 template <int kCamera>
 std::optional<VectorXd> SolveOf(const Problem& problem, const Layout& layout,
-                                const NormalEquations& normal, int threads) {
-  SchurComplement<kCamera> schur(problem, layout, normal, threads);
+                                const NormalEquations& normal) {
+  SchurComplement<kCamera> schur(problem, layout, normal);
   if (!schur.Invert()) return {};
   return ConjugateGradients(
       normal.right(), kOptions, [&](const VectorXd& x) { return schur.Times(x); },
@@ -140,9 +137,9 @@ std::optional<VectorXd> SolveOf(const Problem& problem, const Layout& layout,
 }  // namespace
 
 std::optional<VectorXd> SolveIteratively(const Problem& problem, const Layout& layout,
-                                         const NormalEquations& normal, int threads) {
-  return layout.camera_size() == 8 ? SolveOf<8>(problem, layout, normal, threads)
-                                   : SolveOf<6>(problem, layout, normal, threads);
+                                         const NormalEquations& normal) {
+  return layout.camera_size() == 8 ? SolveOf<8>(problem, layout, normal)
+                                   : SolveOf<6>(problem, layout, normal);
 }
 
 }  // namespace dtr::calib::plain

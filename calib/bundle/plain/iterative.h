@@ -12,6 +12,6 @@ namespace dtr::calib::plain {
 /// never written out (Agarwal et al. 2010, sec. 4). Requires a layout of that kind, in which poses
 /// move. The same bits for any number of threads. Empty where the system is not positive definite.
 std::optional<Eigen::VectorXd> SolveIteratively(const Problem& problem, const Layout& layout,
-                                                const NormalEquations& normal, int threads);
+                                                const NormalEquations& normal);
 
 }  // namespace dtr::calib::plain

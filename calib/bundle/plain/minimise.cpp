@@ -68,13 +68,13 @@ Unknowns Stepped(const Problem& problem, const Layout& layout, const Unknowns& x
 // camera, where it has no pixel: one that is far away, or whose matches are wrong. It would have
 // the step of all rejected, again and again; so it takes the largest part of its own step that
 // keeps it in view.
-double CostInView(const Problem& problem, const Unknowns& x, int threads, Unknowns& next) {
-  const double cost = problem.CostAt(next, threads);
+double CostInView(const Problem& problem, const Unknowns& x, Unknowns& next) {
+  const double cost = problem.CostAt(next);
   if (std::isfinite(cost)) return cost;
   const std::vector<Camera> cameras = problem.CamerasAt(next);
   const std::vector<Intrinsics> lenses = problem.IntrinsicsAt(next);
   const size_t chunks = (problem.points() + kChunkPoints - 1) / kChunkPoints;
-  ParallelFor(0, static_cast<int>(chunks), threads, [&](int chunk) {
+  ParallelFor(0, static_cast<int>(chunks), [&](int chunk) {
     const size_t begin = static_cast<size_t>(chunk) * kChunkPoints;
     for (size_t p = begin; p < std::min(begin + kChunkPoints, problem.points()); ++p) {
       const std::array<double, 3> from = x.place[p], to = next.place[p];
@@ -84,7 +84,7 @@ double CostInView(const Problem& problem, const Unknowns& x, int threads, Unknow
       }
     }
   });
-  return problem.CostAt(next, threads);
+  return problem.CostAt(next);
 }
 
 // lambda, and by what it grows when a step fails (Ceres' rule for its radius).
@@ -125,7 +125,7 @@ MinimiseResult Minimise(const Problem& problem, const MinimiseOptions& options, 
   const Layout layout(problem);
   if (layout.unknowns() == 0) return PlacePoints(problem, options, x);
   MinimiseResult result;
-  result.cost = result.start_cost = problem.CostAt(x, options.threads);
+  result.cost = result.start_cost = problem.CostAt(x);
   if (!std::isfinite(result.cost)) return result;
   const bool robust = problem.loss().scale2 > 0;
   if (robust) result.cost = SettlePoints(problem, options, x);
@@ -137,8 +137,8 @@ MinimiseResult Minimise(const Problem& problem, const MinimiseOptions& options, 
   while (result.iterations < options.max_iterations && damping.lambda < kMaxLambda) {
     if (options.progress != nullptr) options.progress->ThrowIfInterrupted();
     ++result.iterations;
-    normal.Build(x, damping.lambda, options.threads);
-    const auto step = solver.Solve(normal, options.threads);
+    normal.Build(x, damping.lambda);
+    const auto step = solver.Solve(normal);
     if (!step) {
       damping.Reject();
       continue;
@@ -150,7 +150,7 @@ MinimiseResult Minimise(const Problem& problem, const MinimiseOptions& options, 
     const double next_promised = promised * (before > 0 ? std::min(1.0, promised / before) : 1);
     const bool last = next_promised <= options.cost_tolerance * result.cost || promised <= hidden;
     Unknowns next = Stepped(problem, layout, x, *step, points);
-    double cost = CostInView(problem, x, options.threads, next);
+    double cost = CostInView(problem, x, next);
     const double ratio = promised > 0 ? (result.cost - cost) / promised : 0;
     if (((robust && ratio > kFarRatio) || ratio < kNearRatio) && std::isfinite(cost) && !last) {
       const double length = std::min(kMaxLength, 1 / std::max(2 - ratio, 1 / kMaxLength));
@@ -158,7 +158,7 @@ MinimiseResult Minimise(const Problem& problem, const MinimiseOptions& options, 
         for (double& p : point) p *= length;
       }
       Unknowns other = Stepped(problem, layout, x, length * *step, points);
-      const double other_cost = CostInView(problem, x, options.threads, other);
+      const double other_cost = CostInView(problem, x, other);
       if (other_cost < cost) cost = other_cost, next = std::move(other);
     }
     if (cost <= result.cost && (last || result.cost - cost > kMinRatio * promised)) {

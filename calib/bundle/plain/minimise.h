@@ -12,7 +12,6 @@ struct MinimiseOptions {
   /// cost; the step is still taken.
   double cost_tolerance = 1e-9;
   double start_lambda = 1e-4;
-  int threads = 1;
   const Progress* progress = nullptr;  ///< asked every iteration; null: unset
 };
 

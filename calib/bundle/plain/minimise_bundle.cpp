@@ -61,7 +61,6 @@ plain::MinimiseResult MinimisePlain(const Bundle& bundle, const std::vector<Lens
   how.max_iterations = kMaxSteps;
   how.cost_tolerance = cauchy_px > 0 ? kRobustTolerance : kLeastSquaresTolerance;
   how.start_lambda = cauchy_px > 0 ? kRobustLambda : kLeastSquaresLambda;
-  how.threads = options.threads;
   how.progress = options.progress;
   plain::Unknowns x{n.theta, n.motion, n.place, n.shift};
   const plain::Problem problem(bundle, n, used, settings);

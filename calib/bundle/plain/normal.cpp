@@ -337,11 +337,11 @@ NormalEquations::NormalEquations(const Problem& problem, const Layout& layout)
 }
 
 template <int kCamera>
-void NormalEquations::BuildOf(const Unknowns& x, double lambda, int threads) {
+void NormalEquations::BuildOf(const Unknowns& x, double lambda) {
   const std::vector<Camera> cameras = problem_.CamerasAt(x);
   const std::vector<Intrinsics> lenses = problem_.IntrinsicsAt(x);
   const size_t parts = parts_.size(), points = problem_.points();
-  ParallelFor(0, static_cast<int>(parts), threads, [&](int part) {
+  ParallelFor(0, static_cast<int>(parts), [&](int part) {
     const auto k = static_cast<size_t>(part);
     Part<kCamera> sums(*this, cameras, lenses, lambda, parts_[k]);
     for (size_t p = k * points / parts; p < (k + 1) * points / parts; ++p) {
@@ -357,16 +357,16 @@ void NormalEquations::BuildOf(const Unknowns& x, double lambda, int threads) {
   }
 }
 
-void NormalEquations::Build(const Unknowns& x, double lambda, int threads) {
+void NormalEquations::Build(const Unknowns& x, double lambda) {
   switch (layout_.camera_size()) {
     case 6:
-      BuildOf<6>(x, lambda, threads);
+      BuildOf<6>(x, lambda);
       break;
     case 8:
-      BuildOf<8>(x, lambda, threads);
+      BuildOf<8>(x, lambda);
       break;
     default:
-      BuildOf<0>(x, lambda, threads);
+      BuildOf<0>(x, lambda);
   }
   AddPriors(x);
   Damp(lambda);

@@ -27,7 +27,7 @@ class NormalEquations {
 
   /// Works them out. The same bits for any number of threads: parts of fixed size are summed in
   /// their order.
-  void Build(const Unknowns& x, double lambda, int threads);
+  void Build(const Unknowns& x, double lambda);
 
   const std::vector<double>& blocks() const { return sum_.blocks; }  ///< Layout's, damped
   const Eigen::VectorXd& right() const { return sum_.right; }        ///< of the reduced system
@@ -60,7 +60,7 @@ class NormalEquations {
   class Part;
 
   template <int kCamera>
-  void BuildOf(const Unknowns& x, double lambda, int threads);
+  void BuildOf(const Unknowns& x, double lambda);
   template <int kCamera>
   void StepPointsOf(const Eigen::VectorXd& step, std::vector<std::array<double, 3>>& points,
                     double* decrease) const;

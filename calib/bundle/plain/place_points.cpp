@@ -105,14 +105,14 @@ MinimiseResult PlacePoints(const Problem& problem, const MinimiseOptions& option
   const std::vector<Camera> cameras = problem.CamerasAt(x);
   const std::vector<Intrinsics> lenses = problem.IntrinsicsAt(x);
   MinimiseResult result;
-  result.cost = result.start_cost = problem.CostAt(x, options.threads);
+  result.cost = result.start_cost = problem.CostAt(x);
   if (!std::isfinite(result.cost)) return result;
   // Of the mean point's cost: points that two images see have next to none of their own.
   const double enough = options.cost_tolerance * result.cost /
                         static_cast<double>(std::max<size_t>(1, problem.points()));
   const size_t chunks = (problem.points() + kChunkPoints - 1) / kChunkPoints;
   std::vector<PointResult> parts(chunks);
-  ParallelFor(0, static_cast<int>(chunks), options.threads, [&](int chunk) {
+  ParallelFor(0, static_cast<int>(chunks), [&](int chunk) {
     if (options.progress != nullptr) options.progress->ThrowIfInterrupted();
     const size_t begin = static_cast<size_t>(chunk) * kChunkPoints;
     PointResult& part = parts[static_cast<size_t>(chunk)];

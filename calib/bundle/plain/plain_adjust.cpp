@@ -95,7 +95,6 @@ PlainResult AdjustPlain(const PlainOptions& options, const std::vector<bool>& us
   plain::MinimiseOptions how;
   how.max_iterations = options.max_iterations;
   how.cost_tolerance = options.cost_tolerance;
-  how.threads = options.threads;
   how.progress = options.progress;
   plain::Unknowns x{n.theta, n.motion, n.place, n.shift};
   const plain::Problem problem(bundle, n, counts, settings);

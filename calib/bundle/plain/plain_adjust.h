@@ -30,7 +30,6 @@ struct PlainOptions {
   double cauchy_px = 0;          ///< scale of Cauchy's loss; 0: least squares
   double cost_tolerance = 1e-9;  ///< converged where no step promises more, relative to the cost
   int max_iterations = 50;
-  int threads = 1;                     ///< 0: all cores; the result is the same
   const Progress* progress = nullptr;  ///< asked every iteration; Interrupted is thrown
 };
 

@@ -123,12 +123,12 @@ double Problem::PriorAt(const LensPrior& prior, const Unknowns& x,
   return prior.weight * (std::log(fy / fx) - prior.known);
 }
 
-double Problem::CostAt(const Unknowns& x, int threads) const {
+double Problem::CostAt(const Unknowns& x) const {
   const std::vector<Camera> cameras = CamerasAt(x);
   const std::vector<Intrinsics> lenses = IntrinsicsAt(x);
   const size_t chunks = (points() + kChunkPoints - 1) / kChunkPoints;
   std::vector<double> sums(chunks, 0);
-  ParallelFor(0, static_cast<int>(chunks), threads, [&](int chunk) {
+  ParallelFor(0, static_cast<int>(chunks), [&](int chunk) {
     const size_t begin = static_cast<size_t>(chunk) * kChunkPoints;
     const size_t end = std::min(begin + kChunkPoints, points());
     double sum = 0;

@@ -91,7 +91,7 @@ class Problem {
   std::vector<Intrinsics> IntrinsicsAt(const Unknowns& x) const;
   /// Half the sum of losses and squared priors; infinite where an observation has no pixel. Chunks
   /// of fixed size are summed in their order, for any number of threads.
-  double CostAt(const Unknowns& x, int threads) const;
+  double CostAt(const Unknowns& x) const;
   /// Of one point; infinite likewise.
   double PointCost(size_t point, const std::array<double, 3>& place,
                    const std::vector<Camera>& cameras, const std::vector<Intrinsics>& lenses) const;

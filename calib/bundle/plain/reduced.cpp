@@ -25,7 +25,7 @@ void ForEachEntry(const Layout& layout, const std::vector<double>& blocks, const
 
 }  // namespace
 
-std::optional<Eigen::VectorXd> ReducedSolver::Solve(const NormalEquations& normal, int threads) {
+std::optional<Eigen::VectorXd> ReducedSolver::Solve(const NormalEquations& normal) {
   std::optional<Eigen::VectorXd> step;
   switch (layout_.solution()) {
     case Solution::kDense:
@@ -35,7 +35,7 @@ std::optional<Eigen::VectorXd> ReducedSolver::Solve(const NormalEquations& norma
       step = SolveSparse(normal.blocks(), normal.right());
       break;
     case Solution::kIterative:
-      step = SolveIteratively(problem_, layout_, normal, threads);
+      step = SolveIteratively(problem_, layout_, normal);
   }
   if (step && !step->allFinite()) return {};
   return step;

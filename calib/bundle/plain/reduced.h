@@ -17,7 +17,7 @@ class ReducedSolver {
   ReducedSolver(const Problem& problem, const Layout& layout)
       : problem_(problem), layout_(layout) {}
   /// Empty where the matrix is not positive definite.
-  std::optional<Eigen::VectorXd> Solve(const NormalEquations& normal, int threads);
+  std::optional<Eigen::VectorXd> Solve(const NormalEquations& normal);
 
  private:
   std::optional<Eigen::VectorXd> SolveDense(const std::vector<double>& blocks,

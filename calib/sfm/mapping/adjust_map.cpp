@@ -42,7 +42,6 @@ bool AdjustMap(const AdjustMapOptions& options, calib::Bundle* bundle) {
   plain.cauchy_px = options.cauchy_px;
   plain.cost_tolerance = options.cost_tolerance;
   plain.max_iterations = options.iterations;
-  plain.threads = options.threads;
   plain.progress = options.progress;
   calib::Bundle moved = *bundle;
   try {

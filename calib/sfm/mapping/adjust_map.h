@@ -21,7 +21,6 @@ struct AdjustMapOptions {
   double cauchy_px = 1;      ///< scale of Cauchy's loss
   int iterations = 30;
   double cost_tolerance = 1e-5;  ///< relative; an adjustment that another follows needs no more
-  int threads = 1;
   const Progress* progress = nullptr;
 };
 

@@ -71,7 +71,7 @@ class Mapper {
     }
     if (options_.progress != nullptr) options_.progress->Stage("mapping", kSteps);
     cameras_.lenses = graph_.cameras;
-    cameras_.rays = RaysOf(graph_, graph_.cameras, options_.threads);
+    cameras_.rays = RaysOf(graph_, graph_.cameras);
     Rotations rotations = SelectPairs(graph_, cameras_.rays, options_, &mapped_.statistics);
     mapped_.left_out = rotations.left_out;
     mapped_.why_not = rotations.why_not;
@@ -100,9 +100,8 @@ class Mapper {
   }
 
   void Place(const Rotations& rotations) {
-    const Positions positions =
-        PlaceCameras(rotations.cam_from_world, cameras_.rays, nodes_, tracks_, options_.seed,
-                     options_.threads, options_.progress);
+    const Positions positions = PlaceCameras(rotations.cam_from_world, cameras_.rays, nodes_,
+                                             tracks_, options_.seed, options_.progress);
     mapped_.statistics.positioning_cost = positions.cost;
     cameras_.placed = rotations.connected;
     for (const Track& track : tracks_) {
@@ -130,8 +129,7 @@ class Mapper {
         CoveringTracks(static_cast<int>(graph_.images.size()), tracks_, kFirstTracksPerImage);
     for (const Stage& stage :
          {Stage{40, 8, false, 30}, Stage{25, 4, true, 40}, Stage{10, 2, true, 30}}) {
-      points_ = PointsOf(graph_, cameras_, tracks_, part, {stage.max_error, kFirstAngleRad},
-                         options_.threads);
+      points_ = PointsOf(graph_, cameras_, tracks_, part, {stage.max_error, kFirstAngleRad});
       UnplacePoor();
       FilterPoints(graph_, cameras_, {stage.max_error, kFirstAngleRad}, &points_);
       if (!Adjust(stage.cauchy, stage.lenses, stage.iterations)) return false;
@@ -144,7 +142,7 @@ class Mapper {
   // All tracks, twice; images that were lost meanwhile are resected in between.
   bool AdjustAll() {
     const std::vector<int> useful = UsefulTracks();
-    points_ = PointsOf(graph_, cameras_, tracks_, useful, {6}, options_.threads);
+    points_ = PointsOf(graph_, cameras_, tracks_, useful, {6});
     UnplacePoor();
     FilterPoints(graph_, cameras_, {6}, &points_);
     ResectLost();
@@ -152,7 +150,7 @@ class Mapper {
     Step();
     FilterPoints(graph_, cameras_, {4}, &points_);
     if (UnplaceMisfits()) ResectLost();
-    points_ = PointsOf(graph_, cameras_, tracks_, useful, {4}, options_.threads);
+    points_ = PointsOf(graph_, cameras_, tracks_, useful, {4});
     UnplacePoor();
     FilterPoints(graph_, cameras_, {4}, &points_);
     // Slow directions, such as focal length against depth, need many iterations.
@@ -191,7 +189,6 @@ class Mapper {
                              .cauchy_px = cauchy,
                              .iterations = iterations,
                              .cost_tolerance = cost_tolerance,
-                             .threads = options_.threads,
                              .progress = options_.progress};
     double scale = 1;
     for (size_t c = 0; c < images.size(); ++c) {
@@ -205,7 +202,7 @@ class Mapper {
                                     : AdjustMap(options, &bundle);
     if (!adjusted) return false;
     TakeFromBundle(bundle, image_of, &cameras_, &points_);
-    if (lenses) cameras_.rays = RaysOf(graph_, cameras_.lenses, options_.threads);
+    if (lenses) cameras_.rays = RaysOf(graph_, cameras_.lenses);
     return true;
   }
 

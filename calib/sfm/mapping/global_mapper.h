@@ -12,7 +12,6 @@
 namespace dtr::sfm {
 
 struct MapOptions {
-  int threads = 0;  ///< 0: all cores; the result does not depend on it
   std::uint64_t seed = 0;
   bool intrinsics_are_known = false;  ///< the graph's cameras hold; any model will do
   bool focals_are_known = false;      ///< their focal lengths do

@@ -18,7 +18,7 @@ constexpr double kMinExplained = 0.2;
 // photos of two zoom settings one lens with strong distortion may explain both.
 constexpr double kMaxFocalFactor = 2;
 
-MapCameras CamerasOf(const ViewGraph& graph, const calib::SfmModel& model, int threads) {
+MapCameras CamerasOf(const ViewGraph& graph, const calib::SfmModel& model) {
   std::map<std::string, size_t> index;
   for (size_t i = 0; i < graph.images.size(); ++i) index[graph.images[i].name] = i;
   MapCameras cameras;
@@ -36,7 +36,7 @@ MapCameras CamerasOf(const ViewGraph& graph, const calib::SfmModel& model, int t
     cameras.lenses[static_cast<size_t>(graph.images[found->second].camera)] =
         model.cameras.at(image.camera_id);
   }
-  cameras.rays = RaysOf(graph, cameras.lenses, threads);
+  cameras.rays = RaysOf(graph, cameras.lenses);
   return cameras;
 }
 
@@ -98,9 +98,9 @@ double ExplainedShare(const ViewGraph& graph, const MapCameras& cameras,
 
 }  // namespace
 
-std::string WhyRigsContradicted(const ViewGraph& graph, const calib::SfmModel& model, int threads) {
+std::string WhyRigsContradicted(const ViewGraph& graph, const calib::SfmModel& model) {
   constexpr double kMaxContradictedOfRigs = 0.25;
-  const MapCameras cameras = CamerasOf(graph, model, threads);
+  const MapCameras cameras = CamerasOf(graph, model);
   const std::vector<MapPoint> points = PointsOfModel(graph, model);
   MapStatistics statistics;
   (void)WhyNotContradicted({graph, cameras, points, {}}, &statistics);
@@ -109,8 +109,8 @@ std::string WhyRigsContradicted(const ViewGraph& graph, const calib::SfmModel& m
                      100 * statistics.contradicted_share);
 }
 
-std::string WhyContradicted(const ViewGraph& graph, const calib::SfmModel& model, int threads) {
-  const MapCameras cameras = CamerasOf(graph, model, threads);
+std::string WhyContradicted(const ViewGraph& graph, const calib::SfmModel& model) {
+  const MapCameras cameras = CamerasOf(graph, model);
   const std::vector<MapPoint> points = PointsOfModel(graph, model);
   const double explained = ExplainedShare(graph, cameras, points);
   if (explained < kMinExplained) {

@@ -15,11 +15,11 @@ namespace dtr::sfm {
 /// pairs of photos agree on it. One clause; empty: it can be trusted. Images are found by their
 /// names, features by their order. Throws std::invalid_argument where an image of the model is none
 /// of the graph's or has other features.
-std::string WhyContradicted(const ViewGraph& graph, const calib::SfmModel& model, int threads);
+std::string WhyContradicted(const ViewGraph& graph, const calib::SfmModel& model);
 
 /// The same of a model whose images stand as rigs of known form say: what of it hangs on few points
 /// has its position from its rig, and one image of repeated structure decides nothing. The whole of
 /// the matches does.
-std::string WhyRigsContradicted(const ViewGraph& graph, const calib::SfmModel& model, int threads);
+std::string WhyRigsContradicted(const ViewGraph& graph, const calib::SfmModel& model);
 
 }  // namespace dtr::sfm

@@ -267,7 +267,7 @@ Vector2d DepthsOf(const Matrix3d& b_from_a, const Vector3d& b_translation_a, con
           b_translation_a.cross(p).dot(normal) / n2};
 }
 
-Rays RaysOf(const ViewGraph& graph, std::span<const calib::LensCamera> cameras, int threads) {
+Rays RaysOf(const ViewGraph& graph, std::span<const calib::LensCamera> cameras) {
   const int images = static_cast<int>(graph.images.size());
   std::vector<std::vector<char>> matched(graph.images.size());
   for (int i = 0; i < images; ++i) matched[i].resize(graph.images[i].pixels.size());
@@ -275,7 +275,7 @@ Rays RaysOf(const ViewGraph& graph, std::span<const calib::LensCamera> cameras, 
     for (const auto& [a, b] : pair.matches) matched[pair.image_a][a] = matched[pair.image_b][b] = 1;
   }
   Rays rays(graph.images.size());
-  ParallelFor(0, images, threads, [&](int i) {
+  ParallelFor(0, images, [&](int i) {
     const GraphImage& image = graph.images[i];
     rays[i].assign(image.pixels.size(), Vector3d::Zero());
     for (size_t f = 0; f < image.pixels.size(); ++f) {
@@ -289,10 +289,9 @@ Rays RaysOf(const ViewGraph& graph, std::span<const calib::LensCamera> cameras, 
 std::vector<std::optional<RelativeRotation>> RelativeRotationsOf(const ViewGraph& graph,
                                                                  const Rays& rays,
                                                                  std::span<const double> sigma_rad,
-                                                                 int threads,
                                                                  const Progress* progress) {
   std::vector<std::optional<RelativeRotation>> of(graph.pairs.size());
-  ParallelFor(0, static_cast<int>(graph.pairs.size()), threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(graph.pairs.size()), [&](int i) {
     if (progress != nullptr) progress->ThrowIfInterrupted();
     const PairGeometry& pair = graph.pairs[i];
     of[i] = RotationOf(pair, i, rays, std::max(sigma_rad[pair.image_a], sigma_rad[pair.image_b]));

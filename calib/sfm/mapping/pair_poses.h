@@ -18,7 +18,7 @@ using Rays = std::vector<std::vector<Eigen::Vector3d>>;
 
 /// Rays of the graph's images through `cameras` (as ViewGraph::cameras). Features that no match
 /// names get none, since they are not needed.
-Rays RaysOf(const ViewGraph& graph, std::span<const calib::LensCamera> cameras, int threads);
+Rays RaysOf(const ViewGraph& graph, std::span<const calib::LensCamera> cameras);
 
 /// A relative pose, as matches tell.
 struct MatchedPose {
@@ -50,7 +50,7 @@ struct RelativeRotation : MatchedPose {
 /// if one does. `sigma_rad` is what a feature's position is known to, per image. Throws Interrupted
 /// where `progress` (null: nothing) asks to stop.
 std::vector<std::optional<RelativeRotation>> RelativeRotationsOf(
-    const ViewGraph& graph, const Rays& rays, std::span<const double> sigma_rad, int threads,
+    const ViewGraph& graph, const Rays& rays, std::span<const double> sigma_rad,
     const Progress* progress = nullptr);
 
 /// Angle of a match to the epipolar geometry in rad, signed; `ray_a`, `ray_b` unit vectors.

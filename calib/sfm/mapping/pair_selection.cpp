@@ -143,8 +143,7 @@ Rotations SelectPairs(const ViewGraph& graph, const Rays& rays, const MapOptions
   const std::vector<int> nodes = NodesOf(graph);
   std::vector<RelativeRotation> pairs;
   bool parallax = false;
-  for (auto& rotation :
-       RelativeRotationsOf(graph, rays, SigmasOf(graph), options.threads, options.progress)) {
+  for (auto& rotation : RelativeRotationsOf(graph, rays, SigmasOf(graph), options.progress)) {
     if (!rotation || rotation->matches < kMinPairMatches) continue;
     if (nodes[rotation->image_a] == nodes[rotation->image_b]) continue;
     parallax = parallax || graph.pairs[rotation->pair].kind != PairKind::kRotation;

@@ -157,10 +157,10 @@ double LargestAngle(const MapCameras& cameras, const Track& seen, const Vector3d
 
 std::vector<MapPoint> PointsOf(const ViewGraph& graph, const MapCameras& cameras,
                                std::span<const Track> tracks, std::span<const int> chosen,
-                               const PointOptions& options, int threads) {
+                               const PointOptions& options) {
   std::vector<std::optional<MapPoint>> found(chosen.size());
   const auto count = static_cast<int>(chosen.size());
-  ParallelFor(0, (count + kChunk - 1) / kChunk, threads, [&](int chunk) {
+  ParallelFor(0, (count + kChunk - 1) / kChunk, [&](int chunk) {
     for (int i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) {
       found[i] = TrackFit(graph, cameras, tracks[chosen[i]], options.max_error).Fit();
       if (!found[i]) continue;

@@ -45,7 +45,7 @@ double ReprojectionErrorPx(const ViewGraph& graph, const MapCameras& cameras,
 /// without two agreeing features or with too small an angle have none. In the order of `chosen`.
 std::vector<MapPoint> PointsOf(const ViewGraph& graph, const MapCameras& cameras,
                                std::span<const Track> tracks, std::span<const int> chosen,
-                               const PointOptions& options, int threads);
+                               const PointOptions& options);
 
 /// Takes away features that exceed the options' error, then points with fewer than two or too small
 /// an angle.

@@ -274,13 +274,13 @@ std::vector<int> CoveringTracks(int images, std::span<const Track> tracks, int p
 
 Positions PlaceCameras(std::span<const Matrix3d> cam_from_world, const Rays& rays,
                        std::span<const int> node_of, std::span<const Track> tracks,
-                       std::uint64_t seed, int threads, const Progress* progress) {
+                       std::uint64_t seed, const Progress* progress) {
   const auto images = static_cast<int>(cam_from_world.size());
   const Problem problem = MakeProblem(cam_from_world, rays, node_of, tracks,
                                       CoveringTracks(images, tracks, kTracksPerImage));
   std::vector<State> states(kStarts);
   std::vector<double> costs(kStarts);
-  ParallelFor(0, kStarts, threads, [&](int s) {
+  ParallelFor(0, kStarts, [&](int s) {
     states[s] = RandomStart(problem, HashOf(seed, static_cast<std::uint64_t>(s)));
     costs[s] = Minimise(problem, &states[s], progress);
   });

@@ -26,7 +26,7 @@ struct Positions {
 /// that covers all images is used.
 Positions PlaceCameras(std::span<const Eigen::Matrix3d> cam_from_world, const Rays& rays,
                        std::span<const int> node_of, std::span<const Track> tracks,
-                       std::uint64_t seed, int threads, const Progress* progress);
+                       std::uint64_t seed, const Progress* progress);
 
 /// Long tracks first, until every image has `per_image` of them, as indices in rising order. Tracks
 /// that only images with enough have are left out.

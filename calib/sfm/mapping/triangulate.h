@@ -14,7 +14,6 @@ namespace dtr::sfm {
 /// one that most of its features agree with. Points whose rays meet at less than 1.5 degrees are
 /// left out. Image and camera ids are indices + 1. Same bytes for any number of threads (0: all
 /// cores). Throws std::invalid_argument where poses and images differ in number.
-calib::SfmModel TriangulateMatches(const ViewGraph& graph, std::span<const Pose> cam_from_world,
-                                   int threads);
+calib::SfmModel TriangulateMatches(const ViewGraph& graph, std::span<const Pose> cam_from_world);
 
 }  // namespace dtr::sfm

@@ -80,7 +80,7 @@ class Joint {
   bool Repose() {
     constexpr double kBetter = 0.999;  // of a pair's cost
     std::vector<char> better(pairs_.size());
-    ParallelFor(0, static_cast<int>(pairs_.size()), options_.threads, [&](int i) {
+    ParallelFor(0, static_cast<int>(pairs_.size()), [&](int i) {
       const auto p = static_cast<size_t>(i);
       if (options_.progress != nullptr) options_.progress->ThrowIfInterrupted();
       const Posed posed = Reposed(pairs_[p], {lens_, lens_});
@@ -125,7 +125,7 @@ class Joint {
       g += of_pair.g;
     };
     normals.resize(pairs_.size());
-    ParallelFor(0, static_cast<int>(pairs_.size()), options_.threads, [&](int i) {
+    ParallelFor(0, static_cast<int>(pairs_.size()), [&](int i) {
       const auto p = static_cast<size_t>(i);
       normals[p] = NormalOfLens(pairs_[p], lens_, poses_[p]);
     });
@@ -245,7 +245,7 @@ std::optional<VoteResult> VoteOnLens(const std::vector<VotePair>& pairs,
   std::vector<LensPair> of_pairs;
   for (const VoteLens& lens : lenses) of_pairs.push_back({lens, lens});
   std::vector<std::vector<Posed>> posed(pairs.size());
-  ParallelFor(0, static_cast<int>(pairs.size()), options.threads, [&](int p) {
+  ParallelFor(0, static_cast<int>(pairs.size()), [&](int p) {
     if (options.progress != nullptr) options.progress->ThrowIfInterrupted();
     posed[static_cast<size_t>(p)] = OverLenses(pairs[static_cast<size_t>(p)], of_pairs);
   });

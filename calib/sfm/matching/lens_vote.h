@@ -31,7 +31,6 @@ struct VoteOptions {
   bool focal_is_fixed = false;  ///< only k1 is voted on
   bool k1_is_fixed = false;     ///< k1 stays 0: the camera's model has none
   bool fisheye = false;         ///< the lens is one
-  int threads = 0;
   const Progress* progress = nullptr;
 };
 

@@ -69,7 +69,7 @@ void FindMissing(const char* stage, const std::vector<std::pair<int, int>>& pair
   for (size_t begin = 0, end = begin; begin < left.size(); begin = end) {
     end = BlockEnd(left, begin, bytes, options.descriptor_gb * kBytesPerGigabyte, kPairsPerBlock);
     cache.Require(std::span(left).subspan(begin, end - begin));
-    ParallelFor(static_cast<int>(begin), static_cast<int>(end), options.threads, [&](int i) {
+    ParallelFor(static_cast<int>(begin), static_cast<int>(end), [&](int i) {
       progress.ThrowIfInterrupted();
       const auto [a, b] = left[static_cast<size_t>(i)];
       const auto k = static_cast<size_t>(missing[static_cast<size_t>(i)]);
@@ -85,8 +85,7 @@ void CoarseSearch(std::span<const MatchPhoto> photos, const std::vector<std::pai
                   const Part& part, const MatchOptions& options, PairJournal& journal,
                   Progress& progress, std::vector<std::optional<CoarsePair>>& coarse) {
   PhotoCache<LoadedDescriptors> largest(
-      photos.size(), [&](int i) { return DescriptorsOf(photos, i, kLargest, options); },
-      options.threads);
+      photos.size(), [&](int i) { return DescriptorsOf(photos, i, kLargest, options); });
   FindMissing(
       "comparing features", pairs, part, DescriptorBytes(photos, kLargest), options, progress,
       largest, coarse,
@@ -101,15 +100,12 @@ void Verify(std::span<const MatchPhoto> photos, const std::vector<std::pair<int,
             const std::vector<CoarsePair>& coarse, const Overlay& overlay, const ViewGraph& graph,
             const Part& part, const MatchOptions& options, PairJournal& journal, Progress& progress,
             std::vector<std::optional<TriedPair>>& tried) {
-  PhotoCache<RayFeatures> features(
-      photos.size(),
-      [&](int i) {
-        const MatchPhoto& photo = photos[static_cast<size_t>(i)];
-        return RaysOf(WithoutOverlay(overlay, i, photo.features.keypoints),
-                      DescriptorsOf(photos, i, kAll, options),
-                      graph.cameras[static_cast<size_t>(photo.camera)]);
-      },
-      options.threads);
+  PhotoCache<RayFeatures> features(photos.size(), [&](int i) {
+    const MatchPhoto& photo = photos[static_cast<size_t>(i)];
+    return RaysOf(WithoutOverlay(overlay, i, photo.features.keypoints),
+                  DescriptorsOf(photos, i, kAll, options),
+                  graph.cameras[static_cast<size_t>(photo.camera)]);
+  });
   const auto knows = [&](int photo) -> bool {
     return graph.focal_is_known[static_cast<size_t>(photos[static_cast<size_t>(photo)].camera)];
   };

@@ -36,7 +36,6 @@ struct MatchPart {
 };
 
 struct MatchOptions {
-  int threads = 0;  ///< 0: all cores; the result does not depend on it
   std::uint64_t seed = 0;
   /// Per camera whether its intrinsics hold as given, and no vote changes them; empty: of none.
   std::vector<bool> lens_is_known = {};

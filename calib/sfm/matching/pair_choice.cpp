@@ -72,7 +72,7 @@ std::vector<std::pair<int, int>> Candidates(std::span<const MatchPhoto> photos,
         const auto all = DescriptorsOf(photos, i, kIndexed, options).all;
         return std::vector<Descriptor>(all.begin(), all.end());
       },
-      options.seed, options.threads, progress);
+      options.seed, progress);
   const auto is_allowed = [&](int a, int b) {
     return !options.pairs || std::binary_search(options.pairs->begin(), options.pairs->end(),
                                                 std::pair(std::min(a, b), std::max(a, b)));
@@ -80,7 +80,7 @@ std::vector<std::pair<int, int>> Candidates(std::span<const MatchPhoto> photos,
   progress.Stage("ranking photos", count);
   std::vector<std::vector<int>> ranked(photos.size());
   std::atomic<int> done = 0;
-  ParallelFor(0, count, options.threads, [&](int a) {
+  ParallelFor(0, count, [&](int a) {
     progress.ThrowIfInterrupted();
     const std::vector<float> scores = index.ScoresOf(a);
     std::vector<int>& order = ranked[static_cast<size_t>(a)];
@@ -113,11 +113,11 @@ std::vector<int> ScoresOf(std::span<const MatchPhoto> photos,
   const int chunks = (count + kPairsAtOnce - 1) / kPairsAtOnce;
   progress.Stage("comparing photos", chunks);
   std::vector<LoadedDescriptors> largest(photos.size());
-  ParallelFor(0, static_cast<int>(photos.size()), options.threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(photos.size()), [&](int i) {
     largest[static_cast<size_t>(i)] = DescriptorsOf(photos, i, kGlance, options);
   });
   std::atomic<int> done = 0;
-  ParallelFor(0, chunks, options.threads, [&](int chunk) {
+  ParallelFor(0, chunks, [&](int chunk) {
     progress.ThrowIfInterrupted();
     for (int k = chunk * kPairsAtOnce; k < std::min(count, (chunk + 1) * kPairsAtOnce); ++k) {
       const auto [a, b] = pairs[static_cast<size_t>(k)];

@@ -32,8 +32,7 @@ inline size_t BlockEnd(std::span<const std::pair<int, int>> pairs, size_t begin,
 template <typename T>
 class PhotoCache {
  public:
-  PhotoCache(size_t photos, std::function<T(int)> load, int threads)
-      : load_(std::move(load)), loaded_(photos), threads_(threads) {}
+  PhotoCache(size_t photos, std::function<T(int)> load) : load_(std::move(load)), loaded_(photos) {}
 
   /// Drops the photos that these pairs do not need and loads those that are missing.
   void Require(std::span<const std::pair<int, int>> pairs) {
@@ -46,7 +45,7 @@ class PhotoCache {
       if (!needed[i]) loaded_[i].reset();
       if (needed[i] && !loaded_[i]) missing.push_back(static_cast<int>(i));
     }
-    ParallelFor(0, static_cast<int>(missing.size()), threads_, [&](int k) {
+    ParallelFor(0, static_cast<int>(missing.size()), [&](int k) {
       const int photo = missing[static_cast<size_t>(k)];
       loaded_[static_cast<size_t>(photo)].emplace(load_(photo));
     });
@@ -57,7 +56,6 @@ class PhotoCache {
  private:
   std::function<T(int)> load_;
   std::vector<std::optional<T>> loaded_;
-  int threads_;
 };
 
 }  // namespace dtr::sfm::matching

@@ -24,12 +24,12 @@ constexpr float kLengthSquared = 512.0f * 512.0f;
 
 PhotoIndex::PhotoIndex(int photos,
                        const std::function<std::vector<Descriptor>(int)>& descriptors_of,
-                       std::uint64_t seed, int threads, Progress& progress)
+                       std::uint64_t seed, Progress& progress)
     : of_photo_(static_cast<size_t>(photos)) {
   std::vector<std::vector<Descriptor>> all(static_cast<size_t>(photos));
   progress.Stage("indexing photos", 2 * photos);
   std::atomic<int> done = 0;
-  ParallelFor(0, photos, threads, [&](int i) {
+  ParallelFor(0, photos, [&](int i) {
     progress.ThrowIfInterrupted();
     all[static_cast<size_t>(i)] = descriptors_of(i);
     progress.Update(++done);
@@ -43,9 +43,9 @@ PhotoIndex::PhotoIndex(int photos,
       if (HashOf(seed, i, k) % kPerWord < kSamples) sample.push_back(all[i][k]);
     }
   }
-  const Vocabulary vocabulary(sample, total / kPerWord, seed, threads);
+  const Vocabulary vocabulary(sample, total / kPerWord, seed);
   std::vector<std::vector<int>> words(all.size());
-  ParallelFor(0, photos, threads, [&](int i) {
+  ParallelFor(0, photos, [&](int i) {
     progress.ThrowIfInterrupted();
     words[static_cast<size_t>(i)] = vocabulary.WordsOf(all[static_cast<size_t>(i)]);
     progress.Update(++done);

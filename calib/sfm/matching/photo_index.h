@@ -16,7 +16,7 @@ class PhotoIndex {
   /// `descriptors_of(photo)` is called once for each photo, by several threads. Deterministic for
   /// any number of threads.
   PhotoIndex(int photos, const std::function<std::vector<Descriptor>(int)>& descriptors_of,
-             std::uint64_t seed, int threads, Progress& progress);
+             std::uint64_t seed, Progress& progress);
 
   /// How much of what a photo shows each photo shows; 0 for itself. The sum over its descriptors of
   /// log(photos / photos that have it) (inverse document frequency: Sivic and Zisserman, ICCV

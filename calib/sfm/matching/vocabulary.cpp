@@ -25,10 +25,10 @@ std::vector<int> NearestCentre(std::span<const Descriptor> descriptors,
 }
 
 std::vector<int> NearestCentreInChunks(std::span<const Descriptor> descriptors,
-                                       std::span<const Descriptor> centres, int threads) {
+                                       std::span<const Descriptor> centres) {
   std::vector<int> nearest(descriptors.size());
   const size_t chunks = (descriptors.size() + kChunk - 1) / kChunk;
-  ParallelFor(0, static_cast<int>(chunks), threads, [&](int chunk) {
+  ParallelFor(0, static_cast<int>(chunks), [&](int chunk) {
     const size_t begin = static_cast<size_t>(chunk) * kChunk;
     const auto some = descriptors.subspan(begin, std::min(kChunk, descriptors.size() - begin));
     const std::vector<int> found = NearestCentre(some, centres);
@@ -51,7 +51,7 @@ Descriptor DirectionOf(const std::array<std::int64_t, 128>& sum) {
 
 // k-means on the sphere. A centre that loses all of its descriptors stays where it was.
 std::vector<Descriptor> CentresOf(std::span<const Descriptor> sample, size_t count,
-                                  std::uint64_t seed, int threads) {
+                                  std::uint64_t seed) {
   count = std::clamp<size_t>(count, 1, std::max<size_t>(sample.size(), 1));
   std::vector<size_t> order(sample.size());
   std::iota(order.begin(), order.end(), 0);
@@ -61,7 +61,7 @@ std::vector<Descriptor> CentresOf(std::span<const Descriptor> sample, size_t cou
   std::vector<Descriptor> centres;
   for (size_t k = 0; k < std::min(count, order.size()); ++k) centres.push_back(sample[order[k]]);
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    const std::vector<int> nearest = NearestCentreInChunks(sample, centres, threads);
+    const std::vector<int> nearest = NearestCentreInChunks(sample, centres);
     std::vector<std::array<std::int64_t, 128>> sums(centres.size());
     std::vector<bool> is_used(centres.size());
     for (size_t i = 0; i < sample.size(); ++i) {
@@ -88,19 +88,18 @@ std::vector<std::vector<Descriptor>> Grouped(std::span<const Descriptor> descrip
 
 }  // namespace
 
-Vocabulary::Vocabulary(std::span<const Descriptor> sample, size_t words, std::uint64_t seed,
-                       int threads) {
+Vocabulary::Vocabulary(std::span<const Descriptor> sample, size_t words, std::uint64_t seed) {
   const auto root = static_cast<size_t>(std::lround(std::sqrt(static_cast<double>(words))));
-  top_ = CentresOf(sample, std::clamp<size_t>(root, 1, kMaxTop), seed, threads);
-  const auto groups = Grouped(sample, NearestCentreInChunks(sample, top_, threads), top_.size());
+  top_ = CentresOf(sample, std::clamp<size_t>(root, 1, kMaxTop), seed);
+  const auto groups = Grouped(sample, NearestCentreInChunks(sample, top_), top_.size());
   below_.resize(top_.size());
-  ParallelFor(0, static_cast<int>(top_.size()), threads, [&](int c) {
+  ParallelFor(0, static_cast<int>(top_.size()), [&](int c) {
     const auto& group = groups[static_cast<size_t>(c)];
     // Words are as many as descriptors are: where they are dense, words are close.
     const double part = static_cast<double>(group.size()) / static_cast<double>(sample.size());
     const auto count = static_cast<size_t>(std::lround(part * static_cast<double>(words)));
     below_[static_cast<size_t>(c)] =
-        CentresOf(group, count, HashOf(seed, static_cast<std::uint64_t>(c)), 1);
+        CentresOf(group, count, HashOf(seed, static_cast<std::uint64_t>(c)));
   });
   for (const auto& centres : below_) {
     first_word_.push_back(static_cast<int>(size_));

@@ -12,7 +12,7 @@ namespace dtr::sfm::matching {
 class Vocabulary {
  public:
   /// About `words` words, learnt from a sample. Deterministic for any number of threads.
-  Vocabulary(std::span<const Descriptor> sample, size_t words, std::uint64_t seed, int threads);
+  Vocabulary(std::span<const Descriptor> sample, size_t words, std::uint64_t seed);
 
   size_t Size() const { return size_; }
   /// The word of each descriptor, in [0, Size()).

@@ -162,7 +162,7 @@ std::vector<Candidate> CandidatesOf(const std::vector<const CoarsePair*>& pairs,
                                     std::span<const calib::LensCamera> cameras,
                                     const MatchOptions& options) {
   std::vector<Candidate> candidates(pairs.size());
-  ParallelFor(0, static_cast<int>(pairs.size()), options.threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(pairs.size()), [&](int i) {
     if (options.progress != nullptr) options.progress->ThrowIfInterrupted();
     const CoarsePair& pair = *pairs[static_cast<size_t>(i)];
     candidates[static_cast<size_t>(i)] =
@@ -275,7 +275,6 @@ VoteOptions VoteOptionsFor(const calib::LensCamera& prior, const MatchOptions& o
   vote.prior_focal = prior.params[0] / LongSide(prior);
   vote.k1_is_fixed = *RadialIndex(prior.model) < 0;
   vote.fisheye = calib::IsFisheye(prior.model);
-  vote.threads = options.threads;
   vote.progress = options.progress;
   return vote;
 }

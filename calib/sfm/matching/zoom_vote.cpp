@@ -55,7 +55,7 @@ GridCosts CostsOf(const std::vector<VotePair>& pairs, const VoteOptions& options
       lenses.push_back({{a, 0, options.fisheye}, {b, 0, options.fisheye}});
     }
   }
-  ParallelFor(0, static_cast<int>(pairs.size()), options.threads, [&](int p) {
+  ParallelFor(0, static_cast<int>(pairs.size()), [&](int p) {
     if (options.progress != nullptr) options.progress->ThrowIfInterrupted();
     costs.pairs[static_cast<size_t>(p)] = OverLenses(pairs[static_cast<size_t>(p)], lenses);
   });
@@ -193,7 +193,7 @@ class ZoomSolve {
     g[photos + 1] = h(photos + 1, photos + 1) * std::log(state_.common / start_common_);
     for (long i = 0; i < photos; ++i) AddZoom(i, photos + 1, h, g);
     normals.resize(pairs_.size());
-    ParallelFor(0, static_cast<int>(pairs_.size()), options_.threads, [&](int i) {
+    ParallelFor(0, static_cast<int>(pairs_.size()), [&](int i) {
       const auto p = static_cast<size_t>(i);
       normals[p] = NormalOfZoom(pairs_[p], LensesOf(state_, p), state_.poses[p]);
     });

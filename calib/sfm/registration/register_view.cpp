@@ -171,8 +171,7 @@ ViewGraph MatchWith(const UnregisteredView& view, std::span<const SourceView> so
   camera_is_known.push_back(view.camera_is_known);
   focal_is_known.push_back(view.camera_is_known || view.focal_is_known);
   return MatchPhotos(photos, cameras, focal_is_known,
-                     {.threads = 1,
-                      .seed = seed,
+                     {.seed = seed,
                       .lens_is_known = camera_is_known,
                       .pairs = pairs,
                       .progress = &progress})

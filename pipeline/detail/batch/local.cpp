@@ -56,7 +56,7 @@ void RunPartHere(const Batch& batch, const BatchStage& stage, int part, int thre
 }  // namespace
 
 void RunLocally(const Batch& batch, Progress& progress) {
-  const int cores = ResolveThreads(batch.threads);
+  const int cores = batch.threads > 0 ? batch.threads : ThreadLimit::Current();
   for (const BatchStage& stage : batch.stages) {
     const std::vector<int> missing = MissingParts(batch, stage);
     if (missing.empty()) continue;

@@ -32,13 +32,13 @@ calib::BoardCheck Check(const ImageRgb8& image, const calib::Board& board) {
 }  // namespace
 
 void RequireGivenBoard(const std::string& where, const calib::Board& board, std::size_t count,
-                       const std::function<ImageRgb8(std::size_t)>& load, int threads) {
+                       const std::function<ImageRgb8(std::size_t)>& load) {
   const std::size_t images = std::min(kOrder.size(), count);
   std::vector<calib::BoardCheck> checks;
   for (std::size_t begin = 0; begin < kOrder.size(); begin += kAtOnce) {
     std::array<calib::BoardCheck, kAtOnce> next;
     std::array<bool, kAtOnce> looked{};
-    ParallelFor(0, static_cast<int>(kAtOnce), threads, [&](int i) {
+    ParallelFor(0, static_cast<int>(kAtOnce), [&](int i) {
       const auto at = static_cast<std::size_t>(i);
       const std::size_t image = kOrder[begin + at];
       if (image >= images) return;

@@ -15,6 +15,6 @@ namespace dtr::pipeline {
 /// once; those it throws Error for are passed over. Throws UsageError that starts with `where` when
 /// they show another board (calib::DescribeOtherBoard).
 void RequireGivenBoard(const std::string& where, const calib::Board& board, std::size_t count,
-                       const std::function<ImageRgb8(std::size_t)>& load, int threads);
+                       const std::function<ImageRgb8(std::size_t)>& load);
 
 }  // namespace dtr::pipeline

@@ -20,29 +20,26 @@ constexpr size_t kMinViews = 3;
 ImageRgb8 ImageOf(const std::filesystem::path& folder, View view) {
   io::LoadOptions load;
   load.depth = false;
-  load.threads = 1;
   io::LoadPixels(folder, view, load);
   return std::move(view.image);
 }
 
 // Photos of a scene need not show the board: where some seem to, these alone are asked.
 void RequireGivenBoardIn(const std::filesystem::path& folder, std::vector<const View*> views,
-                         const std::vector<calib::Detection>& found, const calib::Board& board,
-                         int threads) {
+                         const std::vector<calib::Detection>& found, const calib::Board& board) {
   std::vector<const View*> seeing;
   for (size_t i = 0; i < views.size(); ++i) {
     if (!found[i].corners.empty()) seeing.push_back(views[i]);
   }
   if (!seeing.empty()) views = std::move(seeing);
-  RequireGivenBoard(
-      folder.string(), board, views.size(), [&](size_t i) { return ImageOf(folder, *views[i]); },
-      threads);
+  RequireGivenBoard(folder.string(), board, views.size(),
+                    [&](size_t i) { return ImageOf(folder, *views[i]); });
 }
 
 }  // namespace
 
 BoardInSet FindBoard(const std::filesystem::path& folder, const DtrSet& set,
-                     const calib::Board& board, int threads, Progress& progress) {
+                     const calib::Board& board, Progress& progress) {
   std::vector<const View*> views;
   for (const View& view : set.frames.front().views) {
     if (view.role == ViewRole::kSource) views.push_back(&view);
@@ -50,13 +47,13 @@ BoardInSet FindBoard(const std::filesystem::path& folder, const DtrSet& set,
   progress.Stage("looking for the board", static_cast<int>(views.size()));
   std::vector<calib::Detection> found(views.size());
   std::atomic<int> done = 0;
-  ParallelFor(0, static_cast<int>(views.size()), threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(views.size()), [&](int i) {
     progress.ThrowIfInterrupted();
     const auto at = static_cast<size_t>(i);
     found[at] = calib::DetectBoard(calib::GreyOf(ImageOf(folder, *views[at])), board);
     progress.Update(++done);
   });
-  RequireGivenBoardIn(folder, views, found, board, threads);
+  RequireGivenBoardIn(folder, views, found, board);
   BoardInSet in_set;
   for (size_t i = 0; i < views.size(); ++i) {
     const View& view = *views[i];

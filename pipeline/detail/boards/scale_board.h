@@ -19,6 +19,6 @@ struct BoardInSet {
 /// Looks for the board in the source views of the set's first frame: what is measured must not
 /// depend on photos that are held out. Throws Error where it is in fewer than 3 of them.
 BoardInSet FindBoard(const std::filesystem::path& folder, const DtrSet& set,
-                     const calib::Board& board, int threads, Progress& progress);
+                     const calib::Board& board, Progress& progress);
 
 }  // namespace dtr::pipeline

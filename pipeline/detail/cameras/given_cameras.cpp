@@ -227,7 +227,6 @@ calib::RefineReport RefineGiven(calib::SfmModel& model, const RefineGivenOptions
                                 Progress& progress) {
   progress.Stage("bundle adjustment", 0);
   calib::RefineOptions options;
-  options.threads = given.threads;
   options.seed = given.seed;
   options.progress = &progress;
   calib::Refined refined = given.are_independent ? calib::RefineIndependent(model, options)

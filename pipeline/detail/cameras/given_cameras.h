@@ -50,7 +50,6 @@ std::vector<size_t> ImagesToTest(const calib::SfmModel& model, const std::vector
 struct RefineGivenOptions {
   /// Points were triangulated here, so that the cameras have not seen their observations.
   bool are_independent = false;
-  int threads = 0;
   std::uint64_t seed = 0;
 };
 

@@ -98,10 +98,8 @@ void RefineWhereAsked(const CalibrateOptions& options, bool are_independent,
   calibrated.report.points = calibrated.model.points.size();
   if (!options.refine_poses) return;
   calibrated.report.bundle_adjustment = {
-      .refined = RefineGiven(
-          calibrated.model,
-          {.are_independent = are_independent, .threads = options.threads, .seed = options.seed},
-          progress),
+      .refined = RefineGiven(calibrated.model,
+                             {.are_independent = are_independent, .seed = options.seed}, progress),
       .metres = {}};
 }
 
@@ -385,8 +383,7 @@ void RegisterHeldOutPhotos(const capture::Capture& held_out,
                            const colmap::SfmOptions& options, const SetRig* panoramas,
                            calib::SfmModel& model, Progress& progress) {
   if (held_out.photos.empty()) return;
-  capture::PrepareSfmImages(held_out, workspace / "photos", 0, options.threads, options.memory_gb,
-                            progress);
+  capture::PrepareSfmImages(held_out, workspace / "photos", 0, options.memory_gb, progress);
   colmap::HeldOutResult placed = colmap::RegisterHeldOut(
       workspace / "photos", SfmInputs(held_out, groups, workspace / "photos"), model, sources,
       workspace / "sfm", workspace / "held_out", options, progress);

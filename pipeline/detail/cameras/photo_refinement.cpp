@@ -34,7 +34,6 @@ calib::RefineOptions RefineOptionsFor(const CalibrateOptions& options, Progress&
   refine.determined = options.determined;
   refine.advice = options.advice;
   refine.separate_lenses = options.sfm.camera_per == CameraPer::kPhoto;
-  refine.threads = options.threads;
   refine.seed = options.seed;
   refine.progress = &progress;
   return refine;
@@ -90,8 +89,8 @@ void ShareFolders(const capture::Capture& capture, const CalibrateOptions& optio
     out.report.camera_sharing = {.camera_per = options.sfm.camera_per, .tests = {}};
   }
   if (groups.pools().empty()) return;
-  FolderCameras chosen = ChooseFolderCameras(groups, capture, out.model, test,
-                                             {options.threads, options.seed, &progress});
+  FolderCameras chosen =
+      ChooseFolderCameras(groups, capture, out.model, test, {options.seed, &progress});
   out.report.camera_sharing = {.camera_per = options.sfm.camera_per,
                                .tests = std::move(chosen.tests)};
   out.model = std::move(chosen.model);

@@ -32,16 +32,15 @@ CastTruth::CastTruth(datasets::DatasetSpec spec, const io::CameraList& list)
   }
 }
 
-ViewTruth CastTruth::On(const View& view, size_t index, int threads) const {
+ViewTruth CastTruth::On(const View& view, size_t index) const {
   const Pose& cam_from_scene = cams_from_scene_[index];
   std::vector<Pose> others = cams_from_scene_;
   others.erase(others.begin() + static_cast<std::ptrdiff_t>(index));
   datasets::PhotoOptions clean;  // texture is evaluated before noise and exposure
   clean.supersampling = spec_.supersampling;
-  clean.threads = threads;
-  ViewTruth truth{datasets::RenderDepth(scene_, view.camera, cam_from_scene, threads, spec_.scale),
-                  datasets::VisibilityMask(scene_, view.camera, cam_from_scene, others,
-                                           kMinVisibleOthers, threads)};
+  ViewTruth truth{
+      datasets::RenderDepth(scene_, view.camera, cam_from_scene, spec_.scale),
+      datasets::VisibilityMask(scene_, view.camera, cam_from_scene, others, kMinVisibleOthers)};
   const Mask texture =
       datasets::TextureMask(datasets::RenderPhoto(scene_, view.camera, cam_from_scene, clean));
   for (size_t i = 0; i < texture.data().size(); ++i) truth.scored.data()[i] &= texture.data()[i];

@@ -29,7 +29,7 @@ class CastTruth {
   /// Casts through the view's own camera from the true pose of list.cameras[index]. Scored is what
   /// two other true cameras see and what has texture, evaluated as `dtr dataset` does, on the
   /// view's grid.
-  ViewTruth On(const View& view, size_t index, int threads) const;
+  ViewTruth On(const View& view, size_t index) const;
 
  private:
   CastTruth(datasets::DatasetSpec spec, const io::CameraList& list);

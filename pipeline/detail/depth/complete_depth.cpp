@@ -73,7 +73,7 @@ DepthImage Completed(const stereo::CellView& cells, const stereo::CompletedCells
 }  // namespace
 
 std::vector<stereo::ScenePlane> CompleteDepth(DtrSet& set, const SparseScene& sparse,
-                                              io::SetWriter& writer, const Room& room,
+                                              io::SetWriter& writer, double memory_gb,
                                               Progress& progress, const KnownCompletion& known) {
   std::vector<View>& views = set.frames.front().views;
   const std::vector<int> sources = ViewsWithDepth(views);
@@ -84,8 +84,8 @@ std::vector<stereo::ScenePlane> CompleteDepth(DtrSet& set, const SparseScene& sp
     cameras.push_back(view.camera);
     farthest = std::max(farthest, view.far_z);
   }
-  const auto bytes = static_cast<double>(stereo::CompletionBytes(cameras, room.threads));
-  if (bytes > room.memory_gb * kBytesPerGigabyte) {
+  const auto bytes = static_cast<double>(stereo::CompletionBytes(cameras));
+  if (bytes > memory_gb * kBytesPerGigabyte) {
     progress.Note(fmt::format(
         "depth is not completed where none was measured: that takes `memory` {:.3f} (GB)",
         bytes / kBytesPerGigabyte));
@@ -93,10 +93,9 @@ std::vector<stereo::ScenePlane> CompleteDepth(DtrSet& set, const SparseScene& sp
   }
   const auto far_z = static_cast<float>(kFarthest * farthest);
   // Beside the cells, which stay until the end.
-  const Room beside{room.threads,
-                    std::max(room.memory_gb - bytes / kBytesPerGigabyte, kLeastRoomGb)};
+  const double beside_gb = std::max(memory_gb - bytes / kBytesPerGigabyte, kLeastRoomGb);
   std::vector<stereo::CellView> cells(sources.size());
-  ForViews(views, sources, "", beside, progress, [&](size_t k) {
+  ForViews(views, sources, "", beside_gb, progress, [&](size_t k) {
     const auto v = static_cast<size_t>(sources[k]);
     View view = Loaded(views[v], writer.folder());
     // What is far is no surface that goes on.
@@ -113,9 +112,9 @@ std::vector<stereo::ScenePlane> CompleteDepth(DtrSet& set, const SparseScene& sp
   const auto neighbours =
       NeighboursOf(views, sources, SourceScene(sparse, views, sources), kNeighbours);
   const std::vector<stereo::ScenePlane> planes =
-      known.depth ? known.planes : stereo::PlanesToChoose(cells, neighbours, room.threads);
-  const auto completed = stereo::CompleteCells(cells, neighbours, planes, room.threads, progress);
-  ForViews(views, sources, "completed depth", beside, progress, [&](size_t k) {
+      known.depth ? known.planes : stereo::PlanesToChoose(cells, neighbours);
+  const auto completed = stereo::CompleteCells(cells, neighbours, planes, progress);
+  ForViews(views, sources, "completed depth", beside_gb, progress, [&](size_t k) {
     const auto v = static_cast<size_t>(sources[k]);
     const DepthImage depth = Completed(cells[k], completed[k], far_z,
                                        Loaded(views[v], writer.folder()), v, known, views[v]);

@@ -73,10 +73,9 @@ struct Sources {
 };
 
 // The image and mask of a view as its set stores them.
-stereo::StereoPixels ReadPixels(const std::filesystem::path& folder, View view, int threads) {
+stereo::StereoPixels ReadPixels(const std::filesystem::path& folder, View view) {
   io::LoadOptions load;
   load.depth = false;
-  load.threads = threads;
   io::LoadPixels(folder, view, load);
   return {std::move(view.image), std::move(view.mask)};
 }
@@ -268,10 +267,9 @@ DepthStageResult DepthStage(DtrSet& set, const SparseScene& sparse, const DepthC
         priors->Widened(stereo::DepthRangesFromPoints(sources.stereo, scene, depth_options.range));
     if (choice.engine == "prior") depth_options.consistency.min_agreeing = 0;
   }
-  depth_options.engine.threads = options.threads;
   depth_options.engine.seed = options.seed;
   depth_options.load_pixels = [&](int source) {
-    return ReadPixels(writer.folder(), view_of(source), options.threads);
+    return ReadPixels(writer.folder(), view_of(source));
   };
   const stereo::QualitySettings quality =
       choice.time_budget_s ? WithinBudget(sources.stereo, scene, choice, depth_options,
@@ -314,8 +312,8 @@ DepthStageResult DepthStage(DtrSet& set, const SparseScene& sparse, const DepthC
   });
   if (options.part) throw PartDone();
   if (options.gains) {
-    const Room room{options.threads, choice.memory_gb.value_or(kDefaultMemoryGb)};
-    SetGains(set, scene, writer.folder(), room, progress);
+    const double memory_gb = choice.memory_gb.value_or(kDefaultMemoryGb);
+    SetGains(set, scene, writer.folder(), memory_gb, progress);
   }
   for (const int index : sources.indices) normals.Deliver(views[static_cast<size_t>(index)]);
   if (const std::string codings = SayDepthCodings(views); !codings.empty()) progress.Note(codings);

@@ -27,7 +27,6 @@ struct DepthStagePart {
 };
 
 struct DepthStageOptions {
-  int threads = 0;
   std::uint64_t seed = 0;
   /// Where normals of the source views go, named as the depth maps, .exr, as stereo::NormalsOf
   /// gives them; empty: nowhere.

@@ -18,18 +18,18 @@ constexpr int kPartners = 8;
 }  // namespace
 
 void SetGains(DtrSet& set, const SparseScene& sources_scene, const std::filesystem::path& folder,
-              const Room& room, Progress& progress) {
+              double memory_gb, Progress& progress) {
   std::vector<View>& views = set.frames.front().views;
   std::vector<int> sources;
   for (size_t i = 0; i < views.size(); ++i) {
     if (views[i].role == ViewRole::kSource) sources.push_back(static_cast<int>(i));
   }
   std::vector<SmallView> small(sources.size());
-  ForViews(views, sources, "", room, progress, [&](size_t k) {
+  ForViews(views, sources, "", memory_gb, progress, [&](size_t k) {
     small[k] = ShrinkForGains(Loaded(views[static_cast<size_t>(sources[k])], folder));
   });
   const auto partners = NeighboursOf(views, sources, sources_scene, kPartners);
-  const std::vector<Eigen::Vector3d> gains = EstimateGains(small, partners, room.threads);
+  const std::vector<Eigen::Vector3d> gains = EstimateGains(small, partners);
   double most = 1;
   for (size_t i = 0; i < sources.size(); ++i) {
     views[static_cast<size_t>(sources[i])].gain = gains[i];

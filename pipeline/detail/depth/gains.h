@@ -5,7 +5,6 @@
 #include "dtr/base/progress.h"
 #include "dtr/types/dtr_set.h"
 #include "dtr/types/sparse_scene.h"
-#include "pipeline/room.h"
 
 namespace dtr::pipeline {
 
@@ -13,6 +12,6 @@ namespace dtr::pipeline {
 /// gains that differ. `sources_scene`: the sparse points, with views as indices among the source
 /// views.
 void SetGains(DtrSet& set, const SparseScene& sources_scene, const std::filesystem::path& folder,
-              const Room& room, Progress& progress);
+              double memory_gb, Progress& progress);
 
 }  // namespace dtr::pipeline

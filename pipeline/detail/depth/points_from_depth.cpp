@@ -15,9 +15,8 @@ namespace {
 constexpr size_t kMaxCandidates = 2'000'000;  // 48 MB
 constexpr double kSameDepth = 0.02;           // relative; what depth maps of one scene differ by
 
-View WithDepth(const std::filesystem::path& folder, View view, int threads) {
+View WithDepth(const std::filesystem::path& folder, View view) {
   io::LoadOptions load;
-  load.threads = threads;
   load.images = view.mask_file.has_value();  // masks come with images
   io::LoadPixels(folder, view, load);
   return view;
@@ -103,8 +102,7 @@ std::optional<Eigen::Vector2d> PixelSeen(const View& view, const Eigen::Vector3d
 }  // namespace
 
 SparseScene PointsFromDepth(const std::filesystem::path& folder, const DtrSet& set,
-                            const PointsFromDepthOptions& options, int threads,
-                            Progress& progress) {
+                            const PointsFromDepthOptions& options, Progress& progress) {
   const std::vector<View>& views = set.frames.front().views;
   const int step = StepFor(set);
   std::vector<Eigen::Vector3d> points;
@@ -112,7 +110,7 @@ SparseScene PointsFromDepth(const std::filesystem::path& folder, const DtrSet& s
   int done = 0;
   for (const View& view : views) {
     progress.ThrowIfInterrupted();
-    if (view.depth_file) AddCandidates(WithDepth(folder, view, threads), step, points);
+    if (view.depth_file) AddCandidates(WithDepth(folder, view), step, points);
     progress.Update(++done);
   }
   points = Thinned(std::move(points), options.max_points);
@@ -123,7 +121,7 @@ SparseScene PointsFromDepth(const std::filesystem::path& folder, const DtrSet& s
     progress.ThrowIfInterrupted();
     is_source.push_back(views[v].depth_file.has_value());
     if (is_source.back()) {
-      const View view = WithDepth(folder, views[v], threads);
+      const View view = WithDepth(folder, views[v]);
       for (size_t i = 0; i < points.size(); ++i) {
         const auto pixel = PixelSeen(view, points[i]);
         if (pixel) all.observations.push_back({static_cast<int>(v), static_cast<int>(i), *pixel});

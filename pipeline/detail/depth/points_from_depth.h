@@ -18,6 +18,6 @@ struct PointsFromDepthOptions {
 /// A view sees a point where its own depth agrees within 2 %; points that a single view sees, at
 /// depth edges most of all, are left out. The same points for any number of threads.
 SparseScene PointsFromDepth(const std::filesystem::path& folder, const DtrSet& set,
-                            const PointsFromDepthOptions& options, int threads, Progress& progress);
+                            const PointsFromDepthOptions& options, Progress& progress);
 
 }  // namespace dtr::pipeline

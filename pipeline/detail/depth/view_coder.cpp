@@ -40,12 +40,11 @@ bool KeepsPixels(const View& view, const prune::Coding& coding) {
 }  // namespace
 
 ViewCoder::ViewCoder(const DtrSet& original, fs::path folder, fs::path trial_folder,
-                     RenderOptions render, int threads)
+                     RenderOptions render)
     : original_(original),
       folder_(std::move(folder)),
       trial_folder_(std::move(trial_folder)),
-      render_(render),
-      threads_(threads) {
+      render_(render) {
   fs::create_directories(trial_folder_);
 }
 
@@ -74,7 +73,7 @@ StoredMesh ViewCoder::MeshOf(const View& stored, const prune::Coding& coding) co
   RenderOptions options = render_;
   options.mesh_tolerance_px = coding.mesh_tolerance_px;
   options.resolution = coding.mesh_resolution;
-  return MakeStoredMesh(plain, options, 1);
+  return MakeStoredMesh(plain, options);
 }
 
 std::uint64_t ViewCoder::TryView(View& view, const View& before,
@@ -141,7 +140,7 @@ prune::CodedSet ViewCoder::Try(const prune::Coding& coding) const {
   prune::CodedSet coded{original_, {}};
   std::vector<View>& views = coded.set.frames.front().views;
   coded.bytes.assign(views.size(), 0);
-  ParallelFor(0, static_cast<int>(views.size()), threads_, [&](int i) {
+  ParallelFor(0, static_cast<int>(views.size()), [&](int i) {
     const auto k = static_cast<size_t>(i);
     if (views[k].role != ViewRole::kSource) return;
     coded.bytes[k] = TryView(views[k], original_.frames.front().views[k], coding);

@@ -15,7 +15,7 @@ class ViewCoder {
   /// `original`: loaded, from `folder`; both must outlive this. Trials leave files in
   /// `trial_folder`, one view's at a time.
   ViewCoder(const DtrSet& original, std::filesystem::path folder,
-            std::filesystem::path trial_folder, RenderOptions render, int threads);
+            std::filesystem::path trial_folder, RenderOptions render);
 
   /// The whole set as a reader would get it, and its views' bytes.
   prune::CodedSet Try(const prune::Coding& coding) const;
@@ -32,7 +32,6 @@ class ViewCoder {
   const DtrSet& original_;
   std::filesystem::path folder_, trial_folder_;
   RenderOptions render_;
-  int threads_;
 };
 
 }  // namespace dtr::pipeline

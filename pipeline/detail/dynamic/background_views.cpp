@@ -48,30 +48,28 @@ void ReadSupport(const fs::path& file, stereo::Background* background) {
                  [](float count) { return static_cast<std::uint8_t>(count); });
 }
 
-View LoadedImage(const io::SetWriter& writer, const View& view, int threads) {
+View LoadedImage(const io::SetWriter& writer, const View& view) {
   View loaded = view;
   io::LoadOptions load;
   load.depth = false;
-  load.threads = threads;
   io::LoadPixels(writer.folder(), loaded, load);
   return loaded;
 }
 
-stereo::Background Found(const DtrSet& dynamic, size_t view, const io::SetWriter& writer,
-                         int threads) {
+stereo::Background Found(const DtrSet& dynamic, size_t view, const io::SetWriter& writer) {
   std::vector<ImageRgb8> images;
   std::vector<Mask> masks;
   for (const size_t step : SampledSteps(dynamic.frames.size())) {
-    View loaded = LoadedImage(writer, dynamic.frames[step].views[view], threads);
+    View loaded = LoadedImage(writer, dynamic.frames[step].views[view]);
     images.push_back(std::move(loaded.image));
     masks.push_back(std::move(loaded.mask));
   }
-  return stereo::FindBackground({images, masks}, threads);
+  return stereo::FindBackground({images, masks});
 }
 
 }  // namespace
 
-BackgroundViews MakeBackgroundViews(const DtrSet& dynamic, io::SetWriter& writer, int threads,
+BackgroundViews MakeBackgroundViews(const DtrSet& dynamic, io::SetWriter& writer,
                                     Progress& progress) {
   BackgroundViews backgrounds;
   backgrounds.set.unit = dynamic.unit;
@@ -93,7 +91,7 @@ BackgroundViews MakeBackgroundViews(const DtrSet& dynamic, io::SetWriter& writer
     if (writer.RestoreView(view) && fs::exists(support)) {
       ReadSupport(support, &background);
     } else {
-      background = Found(dynamic, i, writer, threads);
+      background = Found(dynamic, i, writer);
       WriteSupport(background, support);
       view.image = background.image;
       view.mask = Mask(view.camera.width_px(), view.camera.height_px());
@@ -122,11 +120,11 @@ BackgroundViews MakeBackgroundViews(const DtrSet& dynamic, io::SetWriter& writer
   return backgrounds;
 }
 
-Mask OpenPixels(const View& background, const View& now, const io::SetWriter& writer, int threads) {
+Mask OpenPixels(const View& background, const View& now, const io::SetWriter& writer) {
   stereo::Background behind;
   ReadSupport(SupportFile(writer, background), &behind);
   behind.image = background.image;
-  return stereo::ChangedPixels(now.image, now.mask, behind, threads);
+  return stereo::ChangedPixels(now.image, now.mask, behind);
 }
 
 std::uint64_t TimeStepBytesOf(const std::vector<View>& views) {
@@ -138,16 +136,14 @@ std::uint64_t TimeStepBytesOf(const std::vector<View>& views) {
 TimeStepReader::TimeStepReader(const BackgroundViews& backgrounds, std::vector<View> views,
                                const io::SetWriter& writer,
                                stereo::PlaneMapStore& background_planes,
-                               stereo::PlaneMapStore* before, int round, std::uint64_t cache_bytes,
-                               int threads)
+                               stereo::PlaneMapStore* before, int round, std::uint64_t cache_bytes)
     : backgrounds_(backgrounds),
       views_(std::move(views)),
       writer_(writer),
       background_planes_(background_planes),
       before_(before),
       round_(round),
-      caches_(TimeStepBytesOf(views_) <= cache_bytes),
-      threads_(threads) {}
+      caches_(TimeStepBytesOf(views_) <= cache_bytes) {}
 
 std::vector<stereo::TimeStepSource> TimeStepReader::Sources() {
   std::vector<stereo::TimeStepSource> sources;
@@ -180,11 +176,10 @@ std::shared_ptr<const stereo::TimeStep> TimeStepReader::Read(size_t view) {
   View behind = backgrounds_.set.frames.front().views[view];
   io::LoadOptions load;
   load.sigma = true;
-  load.threads = threads_;
   io::LoadPixels(writer_.folder(), behind, load);
-  const View now = LoadedImage(writer_, views_[view], threads_);
+  const View now = LoadedImage(writer_, views_[view]);
   auto time_step = std::make_shared<stereo::TimeStep>();
-  time_step->open = OpenPixels(behind, now, writer_, threads_);
+  time_step->open = OpenPixels(behind, now, writer_);
   time_step->settled = {std::move(behind.depth), std::move(*behind.inverse_depth_sigma)};
   const int source = static_cast<int>(view);
   time_step->background = *background_planes_.Load(round_, source);

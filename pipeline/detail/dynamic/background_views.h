@@ -25,12 +25,12 @@ struct BackgroundViews {
 
 /// From the images of at most 15 time steps of `dynamic` that `writer` has, one camera in memory at
 /// a time. Those of an interrupted run are found again.
-BackgroundViews MakeBackgroundViews(const DtrSet& dynamic, io::SetWriter& writer, int threads,
+BackgroundViews MakeBackgroundViews(const DtrSet& dynamic, io::SetWriter& writer,
                                     Progress& progress);
 
 /// Where a view of a time step, loaded with image and mask, shows something else than its
 /// background (a view of `set`, loaded with its image): 255, else 0.
-Mask OpenPixels(const View& background, const View& now, const io::SetWriter& writer, int threads);
+Mask OpenPixels(const View& background, const View& now, const io::SetWriter& writer);
 
 /// Fewer time steps say nothing of what stands still.
 inline constexpr size_t kLeastTimeSteps = 3;
@@ -44,7 +44,7 @@ class TimeStepReader {
   /// memory where all together take at most `cache_bytes`.
   TimeStepReader(const BackgroundViews& backgrounds, std::vector<View> views,
                  const io::SetWriter& writer, stereo::PlaneMapStore& background_planes,
-                 stereo::PlaneMapStore* before, int round, std::uint64_t cache_bytes, int threads);
+                 stereo::PlaneMapStore* before, int round, std::uint64_t cache_bytes);
 
   /// One for each source view; they borrow this.
   std::vector<stereo::TimeStepSource> Sources();
@@ -62,7 +62,6 @@ class TimeStepReader {
   stereo::PlaneMapStore* before_;
   int round_;
   bool caches_ = false;
-  int threads_;
   std::mutex mutex_;
   std::map<size_t, std::shared_ptr<const stereo::TimeStep>> cached_;
   std::map<size_t, std::pair<std::int64_t, std::int64_t>> open_;  // of each view: open, all

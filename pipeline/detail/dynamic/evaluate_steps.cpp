@@ -64,7 +64,6 @@ DtrSet LoadedStep(const EvaluateRequest& request, const DtrSet& described, size_
   io::LoadOptions load;
   load.completed = !request.measured_only;
   load.sigma = !request.truth.empty();
-  load.threads = request.threads;
   load.warn = [&progress](const std::string& line) { progress.Note(line); };
   DtrSet set = AtFrame(described, step);
   for (View& view : set.frames.front().views) io::LoadPixels(request.set, view, load);
@@ -164,7 +163,7 @@ EvaluateResult EvaluateSteps(const EvaluateRequest& request, const DtrSet& descr
     progress.ThrowIfInterrupted();
     const DtrSet set = LoadedStep(request, described, step, progress);
     if (!truths.empty()) {
-      ScoreDepth(set, truths.at(numbers[step]), request.threads, quiet, &scorers,
+      ScoreDepth(set, truths.at(numbers[step]), quiet, &scorers,
                  [&](const View& view, const ScoredDepth& depth) {
                    flicker[view.name].Add(depth.measured, depth.truth, depth.scored);
                  });
@@ -172,7 +171,6 @@ EvaluateResult EvaluateSteps(const EvaluateRequest& request, const DtrSet& descr
     if (has_held_out) {
       eval::EvaluateOptions evaluate;
       evaluate.render = request.render;
-      evaluate.render.threads = request.threads;
       evaluate.on_rendered = images.Writer();
       // Renderers know views by where they are in memory: every time step has one of its own.
       means.Add(eval::EvaluateHeldOut(set, evaluate, make_renderer(), quiet));

@@ -23,7 +23,7 @@ std::string PhotoName(const std::string& camera) { return camera + ".png"; }
 
 // The images of one time step as photos, named by their cameras.
 capture::Capture PhotosOfStep(const Recording& recording, size_t step, const fs::path& folder,
-                              int threads, Progress& progress) {
+                              Progress& progress) {
   fs::create_directories(folder);
   for (size_t c = 0; c < recording.cameras().size(); ++c) {
     const fs::path file = folder / PhotoName(recording.cameras()[c]);
@@ -37,8 +37,7 @@ capture::Capture PhotosOfStep(const Recording& recording, size_t step, const fs:
         },
         progress);
   }
-  return capture::IngestPhotos(folder, {.sort = false, .screen = false, .threads = threads},
-                               progress);
+  return capture::IngestPhotos(folder, {.sort = false, .screen = false}, progress);
 }
 
 // Options for the photos of one time step, whose order is that of their file names.
@@ -81,8 +80,7 @@ CalibratedPhotos WithGivenCameras(const capture::Capture& photos, CalibrateOptio
 
 CalibratedPhotos FirstStep(const Recording& recording, const FixedCameraOptions& options,
                            const fs::path& workspace, Progress& progress) {
-  const capture::Capture photos =
-      PhotosOfStep(recording, 0, workspace / "photos0", options.calibrate.threads, progress);
+  const capture::Capture photos = PhotosOfStep(recording, 0, workspace / "photos0", progress);
   const CalibrateOptions calibrate = OptionsFor(photos, recording, options.calibrate);
   if (!options.rig) return CalibratePhotos(photos, calibrate, workspace / "sfm0", progress);
   const SetRig& rig = *options.rig;
@@ -175,8 +173,7 @@ FixedCameras CalibrateFixedCameras(Recording& recording, const FixedCameraOption
   cameras.calibrated = FirstStep(recording, options, workspace, progress);
   TakeCameras(recording, cameras);
   if (options.free_clocks) {
-    cameras.clocks = FindClocks(recording, cameras.lens, cameras.cam_from_world,
-                                options.calibrate.threads, progress);
+    cameras.clocks = FindClocks(recording, cameras.lens, cameras.cam_from_world, progress);
     ShiftByClocks(cameras.clocks, recording, progress);
   }
   cameras.sparse = PointsOf(recording, cameras, options.max_size_px, cameras.calibrated.model);
@@ -185,8 +182,8 @@ FixedCameras CalibrateFixedCameras(Recording& recording, const FixedCameraOption
   for (const size_t step : std::set<size_t>{last / 2, last}) {
     if (step == 0) continue;
     const std::string number = std::to_string(step);
-    const capture::Capture photos = PhotosOfStep(recording, step, workspace / ("photos" + number),
-                                                 options.calibrate.threads, progress);
+    const capture::Capture photos =
+        PhotosOfStep(recording, step, workspace / ("photos" + number), progress);
     WriteCameras(recording.cameras(), cameras.lens, cameras.cam_from_world,
                  workspace / ("cameras" + number));
     try {

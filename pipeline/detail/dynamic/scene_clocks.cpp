@@ -91,7 +91,7 @@ calib::MotionSeen MotionOf(const Recording& recording, size_t camera, const cali
 
 std::vector<calib::MotionClock> FindClocks(const Recording& recording,
                                            const std::vector<calib::LensCamera>& lenses,
-                                           const std::vector<Pose>& cam_from_world, int threads,
+                                           const std::vector<Pose>& cam_from_world,
                                            Progress& progress) {
   progress.Stage("clocks", static_cast<int>(lenses.size()));
   std::vector<calib::MotionSeen> cameras;
@@ -99,7 +99,7 @@ std::vector<calib::MotionClock> FindClocks(const Recording& recording,
     cameras.push_back(MotionOf(recording, c, lenses[c], cam_from_world[c], progress));
     progress.Update(static_cast<int>(c) + 1);
   }
-  return calib::FindMotionClocks(cameras, threads);
+  return calib::FindMotionClocks(cameras);
 }
 
 void ShiftByClocks(const std::vector<calib::MotionClock>& clocks, Recording& recording,

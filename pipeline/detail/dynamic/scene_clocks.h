@@ -15,7 +15,7 @@ namespace dtr::pipeline {
 /// Recording::ForEachFrame.
 std::vector<calib::MotionClock> FindClocks(const Recording& recording,
                                            const std::vector<calib::LensCamera>& lenses,
-                                           const std::vector<Pose>& cam_from_world, int threads,
+                                           const std::vector<Pose>& cam_from_world,
                                            Progress& progress);
 
 /// Takes each camera's nearest frame, and says in a note which.

@@ -62,7 +62,7 @@ class TemporalDepth {
 
   BackgroundViews Compute() {
     ranges_ = RangesOverTime();
-    backgrounds_ = MakeBackgroundViews(set_, writer_, options_.threads, progress_);
+    backgrounds_ = MakeBackgroundViews(set_, writer_, progress_);
     const std::string made_from = ComputeBackground();
     PlaneFiles background_planes(Work("background") / "planes", made_from);
     const size_t steps = set_.frames.size();
@@ -104,7 +104,6 @@ class TemporalDepth {
       const auto from_points = stereo::DepthRangesFromPoints(stereo_views, scene_, of_points);
       stereo::Pages pages;
       stereo::EngineOptions engine_options;
-      engine_options.threads = options_.threads;
       engine_options.seed = options_.seed;
       const auto widened =
           stereo::Widened({stereo_views, chosen, from_points, engine.get(), engine_options,
@@ -122,7 +121,6 @@ class TemporalDepth {
   stereo::StereoPixels PixelsOf(View view) const {
     io::LoadOptions load;
     load.depth = false;
-    load.threads = options_.threads;
     io::LoadPixels(writer_.folder(), view, load);
     return {std::move(view.image), std::move(view.mask)};
   }
@@ -130,14 +128,13 @@ class TemporalDepth {
   // Returns what its planes were computed from.
   std::string ComputeBackground() {
     DepthStageOptions stage;
-    stage.threads = options_.threads;
     stage.seed = options_.seed;
     stage.work = Work("background");
     stage.ranges = ranges_;
     const auto result = DepthStage(backgrounds_.set, scene_, options_.depth, options_.quality,
                                    stage, writer_, progress_);
     FinishScene(backgrounds_.set, points_.points, writer_,
-                {options_.threads, options_.depth.memory_gb.value_or(kDefaultMemoryGb)}, progress_);
+                options_.depth.memory_gb.value_or(kDefaultMemoryGb), progress_);
     return result.planes_made_from;
   }
 
@@ -152,10 +149,8 @@ class TemporalDepth {
     const double memory_gb = options_.depth.memory_gb.value_or(kDefaultMemoryGb);
     TimeStepReader reader(backgrounds_, SourceViews(views), writer_, background_planes,
                           before ? &*before : nullptr, round,
-                          static_cast<std::uint64_t>(kCacheShare * memory_gb * kBytesPerGigabyte),
-                          options_.threads);
+                          static_cast<std::uint64_t>(kCacheShare * memory_gb * kBytesPerGigabyte));
     DepthStageOptions stage;
-    stage.threads = options_.threads;
     stage.seed = options_.seed;
     stage.work = Work(StepName(step));
     stage.ranges = ranges_;
@@ -202,7 +197,6 @@ void ComputeAlone(DtrSet& set, const SparseScene& points, const StepDepthOptions
   for (size_t step = 0; step < set.frames.size(); ++step) {
     progress.ThrowIfInterrupted();
     DepthStageOptions stage;
-    stage.threads = options.threads;
     stage.seed = options.seed;
     stage.work = writer.work_folder() / fmt::format("alone{:04}", step);
     DtrSet still = TakeStep(set, step);
@@ -222,8 +216,8 @@ void FinishSteps(const SparseScene& points, const StepDepthOptions& options, io:
   Bounds bounds;
   for (const size_t step : SomeSteps(set.frames.size())) {
     DtrSet still = TakeStep(set, step);
-    FinishScene(still, points.points, writer,
-                {options.threads, options.depth.memory_gb.value_or(kDefaultMemoryGb)}, quiet);
+    FinishScene(still, points.points, writer, options.depth.memory_gb.value_or(kDefaultMemoryGb),
+                quiet);
     Widen(still.bounds, bounds);
     if (!first) first = still;
     PutBack(std::move(still), step, set);

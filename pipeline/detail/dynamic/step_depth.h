@@ -18,7 +18,6 @@ struct StepDepthOptions {
   DepthChoice depth;
   stereo::QualitySettings quality;
   bool temporal = true;
-  int threads = 0;
   std::uint64_t seed = 0;
 };
 

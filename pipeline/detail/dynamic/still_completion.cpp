@@ -27,10 +27,10 @@ size_t PositionOf(size_t view, const std::vector<View>& views) {
 
 StillCompletion::StillCompletion(BackgroundViews backgrounds, const SparseScene& points,
                                  const std::vector<View>& views, io::SetWriter& writer,
-                                 const Room& room, Progress& progress)
+                                 double memory_gb, Progress& progress)
     : backgrounds_(std::move(backgrounds)), writer_(writer) {
   planes_ = CompleteDepth(backgrounds_.set, SourceScene(points, views, SourceIndices(views)),
-                          writer, room, progress);
+                          writer, memory_gb, progress);
 }
 
 KnownCompletion StillCompletion::Of(const std::vector<View>& views) const {
@@ -50,9 +50,8 @@ DepthImage StillCompletion::Known(size_t source, const View& loaded) const {
   View behind = backgrounds_.set.frames.front().views[source];
   io::LoadOptions load;
   load.completed = true;
-  load.threads = 1;
   io::LoadPixels(writer_.folder(), behind, load);
-  const Mask open = OpenPixels(behind, loaded, writer_, 1);
+  const Mask open = OpenPixels(behind, loaded, writer_);
   DepthImage known = CompletedDepth(behind);
   for (int y = 0; y < known.height(); ++y) {
     for (int x = 0; x < known.width(); ++x) {

@@ -18,7 +18,7 @@ class StillCompletion {
   /// Completes the backgrounds' depth. `views`: those of a time step; `points`: its views are
   /// indices into them.
   StillCompletion(BackgroundViews backgrounds, const SparseScene& points,
-                  const std::vector<View>& views, io::SetWriter& writer, const Room& room,
+                  const std::vector<View>& views, io::SetWriter& writer, double memory_gb,
                   Progress& progress);
 
   /// What is known of a time step with these views; they and this must outlive it.

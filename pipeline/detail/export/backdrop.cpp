@@ -38,7 +38,7 @@ void Backdrop::Sum::Add(const Sum& other, float factor) {
   for (size_t c = 0; c < 3; ++c) rgb[c] += factor * other.rgb[c];
 }
 
-Backdrop::Backdrop(const DtrSet& set, int threads) : set_(set), threads_(threads) {
+Backdrop::Backdrop(const DtrSet& set) : set_(set) {
   std::vector<double> focal, far_z;
   for (const View& view : set.frames.front().views) {
     if (!view.depth_file) continue;
@@ -79,7 +79,7 @@ void Backdrop::AddView(const SurfaceView& surface) {
 }
 
 void Backdrop::AddSky(const SurfaceView& surface) {
-  ParallelFor(0, 6 * side_, threads_, [&](int row) {
+  ParallelFor(0, 6 * side_, [&](int row) {
     for (int x = 0; x < side_; ++x) {
       const int face = row / side_, y = row % side_;
       const Eigen::Vector3d p =

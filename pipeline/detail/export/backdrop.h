@@ -17,7 +17,7 @@ namespace dtr::pipeline {
 class Backdrop {
  public:
   /// `set` must outlive it. `threads` as ParallelFor.
-  Backdrop(const DtrSet& set, int threads);
+  Backdrop(const DtrSet& set);
 
   /// `surface` with its colours. Views in the set's order, once each.
   void AddView(const SurfaceView& surface);
@@ -58,7 +58,6 @@ class Backdrop {
   }
 
   const DtrSet& set_;
-  int threads_;
   Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
   double radius_ = 0;
   int side_ = 1;                    // cells along an edge of the cube, a power of two

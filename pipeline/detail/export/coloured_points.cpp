@@ -9,29 +9,28 @@
 
 namespace dtr::pipeline {
 
-StartPoints StartPointsOf(const std::filesystem::path& folder, const DtrSet& set, int threads,
+StartPoints StartPointsOf(const std::filesystem::path& folder, const DtrSet& set,
                           Progress& progress) {
   StartPoints start;
   if (set.sparse_file) start.scene = io::LoadSparse(folder, set);
   start.from_depth = start.scene.points.empty();
-  if (start.from_depth) start.scene = PointsFromDepth(folder, set, {}, threads, progress);
+  if (start.from_depth) start.scene = PointsFromDepth(folder, set, {}, progress);
   return start;
 }
 
-ImageRgb8 ImageOf(const std::filesystem::path& folder, View view, int threads) {
+ImageRgb8 ImageOf(const std::filesystem::path& folder, View view) {
   io::LoadOptions load;
   load.depth = false;
-  load.threads = threads;
   io::LoadPixels(folder, view, load);
   return std::move(view.image);
 }
 
 size_t WritePointsPly(const std::filesystem::path& file, const std::filesystem::path& folder,
-                      const DtrSet& set, const SparseScene& scene, int threads) {
+                      const DtrSet& set, const SparseScene& scene) {
   DtrSet near = set;
   near.world_origin.setZero();
-  const calib::SfmModel model = colmap::ModelFromViews(
-      near, scene, [&](const View& view) { return ImageOf(folder, view, threads); });
+  const calib::SfmModel model =
+      colmap::ModelFromViews(near, scene, [&](const View& view) { return ImageOf(folder, view); });
   FileStream stream(file);
   std::vector<std::string> comments = FactLines(set);
   comments.push_back("offset " + NumbersText(set.world_origin));

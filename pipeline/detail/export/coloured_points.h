@@ -17,15 +17,15 @@ struct StartPoints {
   SparseScene scene;
   bool from_depth = false;
 };
-StartPoints StartPointsOf(const std::filesystem::path& folder, const DtrSet& set, int threads,
+StartPoints StartPointsOf(const std::filesystem::path& folder, const DtrSet& set,
                           Progress& progress);
 
 /// The image of a view without pixels: one at a time is in memory.
-ImageRgb8 ImageOf(const std::filesystem::path& folder, View view, int threads);
+ImageRgb8 ImageOf(const std::filesystem::path& folder, View view);
 
 /// Writes points relative to the set's origin with the mean colours of the views that see them:
 /// PLY, float x, y, z and uchar red, green, blue. Returns how many.
 size_t WritePointsPly(const std::filesystem::path& file, const std::filesystem::path& folder,
-                      const DtrSet& set, const SparseScene& scene, int threads);
+                      const DtrSet& set, const SparseScene& scene);
 
 }  // namespace dtr::pipeline

@@ -76,10 +76,7 @@ void MarkExport(const DtrSet& set, const char* format, const fs::path& folder) {
 }
 
 SurfaceViews::Options SurfaceOptions(const ExportRequest& request, bool colours) {
-  return {.completed = request.completed,
-          .colours = colours,
-          .memory_gb = request.memory_gb,
-          .threads = request.threads};
+  return {.completed = request.completed, .colours = colours, .memory_gb = request.memory_gb};
 }
 
 void ForEachDepth(SurfaceViews& surfaces, Progress& progress,

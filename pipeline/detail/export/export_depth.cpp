@@ -120,8 +120,7 @@ class DepthExport {
   DepthPlanes PlanesFor(int v) {
     const auto surface = surfaces_.Get(v);
     if (request_.depth_grid == DepthGrid::kSet) return PlanesOf(*surface, request_.depth_kind);
-    return PlanesOnPhoto(*surface, *lenses_[static_cast<size_t>(v)], request_.depth_kind,
-                         request_.threads);
+    return PlanesOnPhoto(*surface, *lenses_[static_cast<size_t>(v)], request_.depth_kind);
   }
 
   void WriteView(size_t v, const DepthPlanes& planes) const {

@@ -148,7 +148,7 @@ ExportReport ExportLas(const ExportRequest& request, Progress& progress) {
   FileStream file(target.path());
   file.Write(HeaderOf(header));
   Fuse(
-      views, {.min_views = request.min_views, .threads = request.threads},
+      views, {.min_views = request.min_views},
       [&](const SurfaceView& surface, const std::vector<FusedSample>& samples) {
         for (const FusedSample& sample : samples) PutPoint(sample, surface.index, header, file);
       },

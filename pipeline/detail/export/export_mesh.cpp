@@ -80,17 +80,13 @@ ExportReport ExportMesh(const ExportRequest& request, Progress& progress) {
   }
   if (extension == ".glb") NoteOffset(set, progress);
   FileInWork target(output);
-  SurfaceViews views(request.set, set,
-                     {.completed = request.completed,
-                      .colours = true,
-                      .memory_gb = request.memory_gb / 2,
-                      .threads = request.threads});
-  const Mesh mesh = MeshOf(views,
-                           {.voxel = request.voxel,
-                            .min_views = request.min_views,
-                            .threads = request.threads,
-                            .memory_gb = request.memory_gb / 2},
-                           progress);
+  SurfaceViews views(
+      request.set, set,
+      {.completed = request.completed, .colours = true, .memory_gb = request.memory_gb / 2});
+  const Mesh mesh = MeshOf(
+      views,
+      {.voxel = request.voxel, .min_views = request.min_views, .memory_gb = request.memory_gb / 2},
+      progress);
   if (mesh.triangles.empty()) {
     throw Error(fmt::format("{}: no surface that {} views show; choose fewer views",
                             request.set.string(), request.min_views));

@@ -166,7 +166,7 @@ ExportReport ExportMiv(const ExportRequest& request, Progress& progress) {
     ForEachDepth(surfaces, progress, [&](size_t, const View& view, const SurfaceView& surface) {
       const PinholeCamera& camera = view.camera;
       odd = odd || camera.width_px() % 2 != 0 || camera.height_px() % 2 != 0;
-      WriteTexture(folder / TextureName(view), ImageOf(request.set, view, request.threads));
+      WriteTexture(folder / TextureName(view), ImageOf(request.set, view));
       const DepthPlanes planes = PlanesOf(surface, DepthKind::kPlaneZ);
       WriteDepth(folder / DepthName(view), view, OnImageGrid(planes.depth, view.depth_scale));
       views.push_back(&view);

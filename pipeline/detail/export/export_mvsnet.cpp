@@ -87,7 +87,7 @@ void WriteJpg(const ExportRequest& request, const View& view, const fs::path& fi
   if (LowerExtension(stored) == ".jpg") {
     CopyFileAtomically(stored, file);
   } else {
-    io::WriteImage(file, ImageOf(request.set, view, request.threads));
+    io::WriteImage(file, ImageOf(request.set, view));
   }
 }
 

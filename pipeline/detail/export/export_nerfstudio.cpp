@@ -54,12 +54,11 @@ class NerfstudioExport {
     ChooseUnit(with_depth, progress);
     WriteDepth(with_depth, progress);
     WriteImagesAndMasks();
-    const StartPoints start = StartPointsOf(request_.set, set_, request_.threads, progress);
+    const StartPoints start = StartPointsOf(request_.set, set_, progress);
     ExportReport report{.images = Views().size(),
                         .depth_maps = with_depth.size(),
                         .points_from_depth = start.from_depth};
-    report.points = WritePointsPly(folder_ / "sparse_pc.ply", request_.set, set_, start.scene,
-                                   request_.threads);
+    report.points = WritePointsPly(folder_ / "sparse_pc.ply", request_.set, set_, start.scene);
     WriteTransforms();
     return report;
   }

@@ -193,7 +193,7 @@ class OpenMvsExport {
 
   // Points that two images see, with their colours.
   void PutPoints(FileStream& stream, Progress& progress, ExportReport& report) {
-    StartPoints start = StartPointsOf(request_.set, set_, request_.threads, progress);
+    StartPoints start = StartPointsOf(request_.set, set_, progress);
     std::vector<bool> keep(Views().size());
     for (size_t v = 0; v < keep.size(); ++v) keep[v] = image_of_[v] >= 0;
     const SparseScene scene = RestrictToViews(start.scene, keep);
@@ -203,9 +203,8 @@ class OpenMvsExport {
     }
     DtrSet near = set_;
     near.world_origin.setZero();
-    const calib::SfmModel model = colmap::ModelFromViews(near, scene, [&](const View& view) {
-      return ImageOf(request_.set, view, request_.threads);
-    });
+    const calib::SfmModel model = colmap::ModelFromViews(
+        near, scene, [&](const View& view) { return ImageOf(request_.set, view); });
     stream.Put(static_cast<std::uint64_t>(scene.points.size()));
     for (size_t p = 0; p < scene.points.size(); ++p) {
       for (const double v : scene.points[p].p_in_world) stream.Put(static_cast<float>(v));

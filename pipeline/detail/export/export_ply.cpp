@@ -54,7 +54,7 @@ ExportReport ExportPly(const ExportRequest& request, Progress& progress) {
   FileStream file(target.path());
   file.Write(PlyHeader(0, comments, layout.properties));
   Fuse(
-      views, {.min_views = request.min_views, .threads = request.threads},
+      views, {.min_views = request.min_views},
       [&](const SurfaceView&, const std::vector<FusedSample>& samples) {
         for (const FusedSample& sample : samples) Put(sample, set.world_origin, layout, file);
         report.points += samples.size();

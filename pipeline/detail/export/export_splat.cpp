@@ -34,18 +34,15 @@ class Gaussians {
 
   std::vector<Gaussian> Make(Progress& progress) {
     SurfaceViews views(request_.set, set_,
-                       {.completed = true,
-                        .colours = true,
-                        .memory_gb = request_.memory_gb,
-                        .threads = request_.threads});
-    Backdrop backdrop(set_, request_.threads);
+                       {.completed = true, .colours = true, .memory_gb = request_.memory_gb});
+    Backdrop backdrop(set_);
     for (const int v : views.WithDepth()) {
       progress.ThrowIfInterrupted();
       backdrop.AddView(*views.Get(v));
     }
     if (request_.max_count == 0) gaussians_ = backdrop.Gaussians();
     Fuse(
-        views, {.min_views = 1, .threads = request_.threads},
+        views, {.min_views = 1},
         [&](const SurfaceView& surface, std::vector<FusedSample> samples) {
           std::erase_if(samples, [&](const FusedSample& sample) {
             return backdrop.Hides(sample.p_in_world);

@@ -326,7 +326,7 @@ void Fuse(SurfaceViews& views, const FuseOptions& options, const FusedSink& sink
       const ViewFusion fusion(options, *surface, loaded, marks, may_leave);
       std::vector<std::vector<FusedSample>> rows(
           static_cast<size_t>(surface->inverse_depth.height()));
-      ParallelFor(0, surface->inverse_depth.height(), options.threads,
+      ParallelFor(0, surface->inverse_depth.height(),
                   [&](int y) { rows[static_cast<size_t>(y)] = fusion.Row(y); });
       std::vector<FusedSample> samples;
       for (const auto& row : rows) samples.insert(samples.end(), row.begin(), row.end());

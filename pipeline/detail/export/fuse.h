@@ -16,7 +16,6 @@ struct FuseOptions {
   double tolerance_px = 1;      ///< they differ by at most so many pixels of disparity
   double tolerance_sigmas = 3;  ///< and by so many standard deviations of the difference
   int neighbours = 16;  ///< views that a sample is compared with; some more where these see it
-  int threads = 0;
 };
 
 /// A pixel of a depth map that stands for a patch of the surface.

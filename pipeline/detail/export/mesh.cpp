@@ -103,15 +103,13 @@ class MeshMaker {
       const View& view = all[static_cast<size_t>(v)];
       const auto surface = views_.Get(v);
       const NearDepths near_depths(*surface, mesh_.voxel);
-      ParallelFor(0, static_cast<int>((places_.size() + kBatch - 1) / kBatch), options_.threads,
-                  [&](int batch) {
-                    const size_t first = static_cast<size_t>(batch) * kBatch;
-                    for (size_t i = first; i < std::min(first + kBatch, places_.size()); ++i) {
-                      if (reached[i] >= options_.min_views) continue;
-                      reached[i] +=
-                          MaySee(view, places_[i], mesh_.voxel) && near_depths.MayReach(places_[i]);
-                    }
-                  });
+      ParallelFor(0, static_cast<int>((places_.size() + kBatch - 1) / kBatch), [&](int batch) {
+        const size_t first = static_cast<size_t>(batch) * kBatch;
+        for (size_t i = first; i < std::min(first + kBatch, places_.size()); ++i) {
+          if (reached[i] >= options_.min_views) continue;
+          reached[i] += MaySee(view, places_[i], mesh_.voxel) && near_depths.MayReach(places_[i]);
+        }
+      });
     }
     size_t kept = 0;
     for (size_t i = 0; i < places_.size(); ++i) {
@@ -141,7 +139,7 @@ class MeshMaker {
       std::sort(needed.begin(), needed.end());
       needed.erase(std::unique(needed.begin(), needed.end()), needed.end());
       const SurfaceList loaded = views_.GetAll(needed);
-      ParallelFor(0, static_cast<int>(end - first), options_.threads, [&](int i) {
+      ParallelFor(0, static_cast<int>(end - first), [&](int i) {
         SurfaceList own;
         for (const int v : seeing[static_cast<size_t>(i)]) {
           const auto at = std::lower_bound(needed.begin(), needed.end(), v) - needed.begin();
@@ -258,7 +256,7 @@ class MeshMaker {
     for (const int v : with_depth) {
       progress_.ThrowIfInterrupted();
       const auto surface = views_.Get(v);
-      ParallelFor(0, static_cast<int>(sums.size()), options_.threads, [&](int i) {
+      ParallelFor(0, static_cast<int>(sums.size()), [&](int i) {
         AddColour(*surface, static_cast<size_t>(i), sums[static_cast<size_t>(i)]);
       });
       progress_.Update(++done);

@@ -11,9 +11,8 @@
 namespace dtr::pipeline {
 
 struct MeshOptions {
-  double voxel = 0;   ///< scene units; 0: twice the median width of a pixel on the surface
-  int min_views = 2;  ///< that show a surface at the same depth
-  int threads = 0;
+  double voxel = 0;      ///< scene units; 0: twice the median width of a pixel on the surface
+  int min_views = 2;     ///< that show a surface at the same depth
   double memory_gb = 4;  ///< for what is made; a larger voxel is taken where it would be more
 };
 

@@ -5,13 +5,13 @@
 
 namespace dtr::pipeline {
 
-DepthPlanes PlanesOnPhoto(const SurfaceView& surface, const calib::LensCamera& lens, DepthKind kind,
-                          int threads) {
+DepthPlanes PlanesOnPhoto(const SurfaceView& surface, const calib::LensCamera& lens,
+                          DepthKind kind) {
   const int width = lens.width_px, height = lens.height_px;
   DepthPlanes planes{DepthImage(width, height, kind), Grid<float>(width, height),
                      Mask(width, height)};
   const calib::LensMap map(lens);
-  ParallelFor(0, height, threads, [&](int y) {
+  ParallelFor(0, height, [&](int y) {
     for (int x = 0; x < width; ++x) {
       const auto pixel = calib::UndistortedPixel(map, surface.camera, {x + 0.5, y + 0.5});
       if (!pixel || !surface.camera.Contains(*pixel)) continue;

@@ -9,7 +9,7 @@ namespace dtr::pipeline {
 /// pixel meets the view's surface, interpolated within one surface only. Ray distance is along the
 /// lens' ray, z that of the view's camera, which is the same direction. Holes where the lens has no
 /// ray, or one that the set's image does not show. `threads` as ParallelFor.
-DepthPlanes PlanesOnPhoto(const SurfaceView& surface, const calib::LensCamera& lens, DepthKind kind,
-                          int threads);
+DepthPlanes PlanesOnPhoto(const SurfaceView& surface, const calib::LensCamera& lens,
+                          DepthKind kind);
 
 }  // namespace dtr::pipeline

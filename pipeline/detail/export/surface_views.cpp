@@ -142,7 +142,6 @@ SurfaceView SurfaceViews::Load(int index) const {
   load.images = view.mask_file.has_value();  // masks come with images
   load.sigma = true;
   load.completed = options_.completed;
-  load.threads = 1;
   io::LoadPixels(folder_, view, load);
   SurfaceView surface;
   surface.index = index;
@@ -187,7 +186,7 @@ std::vector<std::shared_ptr<const SurfaceView>> SurfaceViews::GetAll(
     if (!held_.contains(view)) missing.push_back(view);
   }
   std::vector<std::shared_ptr<const SurfaceView>> loaded(missing.size());
-  ParallelFor(0, static_cast<int>(missing.size()), options_.threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(missing.size()), [&](int i) {
     loaded[static_cast<size_t>(i)] =
         std::make_shared<const SurfaceView>(Load(missing[static_cast<size_t>(i)]));
   });

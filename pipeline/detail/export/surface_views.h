@@ -72,7 +72,6 @@ class SurfaceViews {
     bool completed = false;  ///< with what was completed, but for what is infinitely far
     bool colours = false;
     double memory_gb = 4;
-    int threads = 0;
   };
   /// `set` must outlive it.
   SurfaceViews(std::filesystem::path folder, const DtrSet& set, const Options& options)

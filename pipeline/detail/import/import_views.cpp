@@ -181,7 +181,7 @@ nlohmann::json Inputs(const io::CameraList& list, const ImportOptions& options,
   std::vector<nlohmann::json> photos(list.cameras.size());
   progress.Stage("hash", count);
   std::atomic<int> done{0};
-  ParallelFor(0, count, options.threads, [&](int i) {
+  ParallelFor(0, count, [&](int i) {
     progress.ThrowIfInterrupted();
     const io::NamedCamera& named = list.cameras[static_cast<size_t>(i)];
     nlohmann::json& photo = photos[static_cast<size_t>(i)];
@@ -332,7 +332,7 @@ void WriteViews(const io::CameraList& list, const ImportOptions& options, io::Se
   MemoryBudget memory(options.memory_gb);
   std::atomic<int> done{0};
   std::vector<ViewNote> notes(list.cameras.size());
-  ParallelFor(0, count, options.threads, [&](int i) {
+  ParallelFor(0, count, [&](int i) {
     progress.ThrowIfInterrupted();
     const auto at = static_cast<size_t>(i);
     const PinholeCamera& camera = list.cameras[at].camera;
@@ -377,7 +377,7 @@ io::AlphaTotals WriteSet(const io::CameraList& list, const ImportOptions& option
   }
   if (options.completion && !options.depth_dir.empty()) {
     const double memory_gb = options.memory_gb > 0 ? options.memory_gb : kDefaultMemoryGb;
-    CompleteDepth(set, scene, writer, {options.threads, memory_gb}, progress);
+    CompleteDepth(set, scene, writer, memory_gb, progress);
   }
   writer.Finish(set);
   return alpha;
@@ -402,7 +402,7 @@ std::vector<View> ImportViews(const io::CameraList& list, const ImportOptions& o
   RequireHeldOutNames(list, options);
   const std::vector<std::string> ids = IdsOf(list);
   std::vector<View> views(list.cameras.size());
-  ParallelFor(0, static_cast<int>(views.size()), options.threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(views.size()), [&](int i) {
     const auto at = static_cast<size_t>(i);
     views[at] = ImportView(list.cameras[at], ids[at], options);
   });

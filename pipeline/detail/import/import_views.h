@@ -48,7 +48,6 @@ struct ImportOptions {
   std::function<std::unique_ptr<CameraDistortion>(const io::NamedCamera&)> distortion_of;
   std::set<std::string> held_out;  ///< names of the list: camera and image are kept, depth is not
   DepthCoding depth_coding = DepthCoding::kPng16InverseDepth;
-  int threads = 0;  ///< 0: all cores; the set does not depend on it
   /// Views in memory at a time take at most so many 1e9 bytes, and one that alone takes more is
   /// rejected; 0: no bound.
   double memory_gb = 0;

@@ -53,14 +53,14 @@ bool IsFaulty(const capture::Photo& photo) {
 
 }  // namespace
 
-CaptureLook LookAt(const capture::Capture& capture, const std::string& title, int threads,
-                   double memory_gb, Progress& progress) {
+CaptureLook LookAt(const capture::Capture& capture, const std::string& title, double memory_gb,
+                   Progress& progress) {
   const int count = static_cast<int>(capture.photos.size());
   progress.Stage("contact sheet", count);
   std::vector<ImageRgb8> thumbnails(capture.photos.size());
   std::atomic<int> done{0};
   MemoryBudget memory(memory_gb);
-  ParallelFor(0, count, threads, [&](int i) {
+  ParallelFor(0, count, [&](int i) {
     progress.ThrowIfInterrupted();
     const auto index = static_cast<size_t>(i);
     const auto share = memory.Take(MemoryOf(capture.photos[index]));

@@ -34,7 +34,7 @@ void WriteSetPage(const io::SetWriter& writer, const DtrSet& set, const SetPageF
   std::vector<int> all_views(views.size());
   std::iota(all_views.begin(), all_views.end(), 0);
   info.for_rows = [&](size_t, const std::function<void(size_t)>& row) {
-    ForViews(views, all_views, "page", facts.room, progress, row);
+    ForViews(views, all_views, "page", facts.memory_gb, progress, row);
   };
   info.load = [&](const View& view) { return Loaded(view, writer.folder(), {.sigma = true}); };
   for (const auto& [name, reason] : facts.skipped) info.skipped.push_back({name, reason});

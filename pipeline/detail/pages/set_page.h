@@ -10,7 +10,6 @@
 #include "dtr/types/check.h"
 #include "dtr/types/dtr_set.h"
 #include "pipeline/depth_prior.h"
-#include "pipeline/room.h"
 
 namespace dtr::pipeline {
 
@@ -22,7 +21,7 @@ struct SetPageFacts {
   std::vector<std::pair<std::string, std::string>> skipped;  ///< file, reason
   size_t not_registered = 0;
   std::optional<DepthPriorReport> prior = {};
-  Room room = {};
+  double memory_gb = 0;  ///< GB of 1e9 bytes for all that the program holds; 0: no bound
 };
 
 /// Writes report/index.html into the writer's folder: source views only, as pixels of held-out

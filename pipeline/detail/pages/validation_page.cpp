@@ -175,7 +175,6 @@ void AddWorstViews(report::HtmlReport& page, const fs::path& folder, const std::
     View view = views[i];
     io::LoadOptions load;
     load.depth = false;
-    load.threads = 1;
     io::LoadPixels(folder, view, load);
     page.Svg(fmt::format("{}: RMS {:.3f} px, worst {:.3f} px, {} tested; residuals {:.3g} times as "
                          "long",

@@ -40,7 +40,6 @@ Attempt Refined(const SfmRun& run, const CalibrateOptions& options, const colmap
 
 std::string WhyUndetermined(const SfmRun& run, const calib::SfmModel& model, Progress& progress) {
   calib::RefineOptions refine;
-  refine.threads = run.options.threads;
   refine.seed = run.options.seed;
   refine.progress = &progress;
   return calib::WhyUndetermined(model, refine);

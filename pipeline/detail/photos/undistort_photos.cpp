@@ -103,16 +103,15 @@ std::vector<View> UndistortPhotos(const capture::Capture& capture,
     const capture::Photo& photo = *photos[begin + k];
     const calib::LensCamera& lens = model.cameras.at(registered.at(photo.name)->camera_id);
     const capture::PhotoPixels pixels = capture::ReadPhotoAndMask(photo);
-    calib::UndistortedPhoto flat =
-        calib::Undistort(pixels.image, pixels.mask, lens, CameraToDrawOn(lens, stabilised),
-                         options.max_size_px, options.room.threads);
+    calib::UndistortedPhoto flat = calib::Undistort(
+        pixels.image, pixels.mask, lens, CameraToDrawOn(lens, stabilised), options.max_size_px);
     view.image = std::move(flat.image);
     view.mask = std::move(flat.mask);
     writer.WriteView(view, calibrated.unit);
     view.image = {};
     view.mask = {};
   };
-  SideBySide(end - begin, undistorted ? "reading photos" : "undistorting", options.room, bytes,
+  SideBySide(end - begin, undistorted ? "reading photos" : "undistorting", options.memory_gb, bytes,
              progress, draw);
   return views;
 }

@@ -8,14 +8,13 @@
 #include "dtr/io/set_io.h"
 #include "dtr/types/dtr_set.h"
 #include "pipeline/calibrate.h"
-#include "pipeline/room.h"
 
 namespace dtr::pipeline {
 
 struct UndistortOptions {
-  int max_size_px = 0;  ///< long side of the images; 0: full size
-  Room room = {};
-  Part part = {};  ///< of the views: the others are not written, and have no files
+  int max_size_px = 0;   ///< long side of the images; 0: full size
+  double memory_gb = 0;  ///< GB of 1e9 bytes for all that the program holds; 0: no bound
+  Part part = {};        ///< of the views: the others are not written, and have no files
 };
 
 /// Views of the registered photos, in the photos' order, on the grid that calib::Undistort gives

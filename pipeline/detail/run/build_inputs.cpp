@@ -93,13 +93,10 @@ capture::Capture FramesOf(const BuildOptions& options, const std::filesystem::pa
                   "stage first");
     }
     capture::VideoOptions video = options.video;
-    video.threads = options.threads;
     video.memory_gb = options.depth.memory_gb.value_or(kDefaultMemoryGb);
     const capture::Capture frames = Ingest(
         options.photos, video, options.panoramas, [&] { return fresh; }, progress);
-    capture::WriteCapture(
-        frames, kept, {.replace = false, .threads = options.threads, .memory_gb = video.memory_gb},
-        progress);
+    capture::WriteCapture(frames, kept, {.replace = false, .memory_gb = video.memory_gb}, progress);
     RemoveTree(fresh);
   }
   return capture::ReadCapture(kept);
@@ -202,8 +199,7 @@ BuildInputs LookAtInputs(const BuildOptions& options, std::optional<SetRig> rig,
   inputs.from_video = !capture::VideosOf(options.photos).empty();
   inputs.is_derived = inputs.from_video;
   if (inputs.from_video) return inputs;
-  inputs.photos = capture::IngestPhotos(
-      options.photos, {.threads = options.threads, .memory_gb = memory_gb}, progress);
+  inputs.photos = capture::IngestPhotos(options.photos, {.memory_gb = memory_gb}, progress);
   inputs.is_derived = capture::ArePanoramas(inputs.photos, options.panoramas, &progress);
   if (inputs.is_derived && options.poses.empty()) RequirePanoramaOptions(options);
   if (!inputs.is_derived) TestPhotos(options, inputs, progress);

@@ -16,11 +16,11 @@
 
 namespace dtr::pipeline {
 void FinishScene(DtrSet& set, std::span<const SparsePoint> points, const io::SetWriter& writer,
-                 const Room& room, Progress& progress) {
+                 double memory_gb, Progress& progress) {
   const std::vector<View>& views = set.frames.front().views;
   const std::vector<int> which = ViewsWithDepth(views);
   std::vector<DepthSamples> samples(which.size());
-  ForViews(views, which, "extent of the scene", room, progress, [&](size_t k) {
+  ForViews(views, which, "extent of the scene", memory_gb, progress, [&](size_t k) {
     samples[k].Add(
         Loaded(views[static_cast<size_t>(which[k])], writer.folder(), {.images = false}));
   });
@@ -30,11 +30,11 @@ void FinishScene(DtrSet& set, std::span<const SparsePoint> points, const io::Set
                  !which.empty() || points.empty() ? all.Extent() : SceneExtentFromPoints(points));
 }
 
-void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, const Room& room,
+void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, double memory_gb,
                  Progress& progress) {
   std::vector<View>& views = set.frames.front().views;
   const std::vector<int> which = ViewsWithDepth(views);
-  ForViews(views, which, "coding depth", room, progress, [&](size_t k) {
+  ForViews(views, which, "coding depth", memory_gb, progress, [&](size_t k) {
     View& view = views[static_cast<size_t>(which[k])];
     View loaded = Loaded(view, writer.folder(), {.images = false});
     if (!io::TrySetDepthError(loaded, error_px * ThresholdsOf(loaded, {}).pixel)) {
@@ -51,14 +51,14 @@ void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, const Room
   });
 }
 
-DepthCount WriteMeshes(DtrSet& set, io::SetWriter& writer, const Room& room, Progress& progress) {
+DepthCount WriteMeshes(DtrSet& set, io::SetWriter& writer, double memory_gb, Progress& progress) {
   std::vector<View>& views = set.frames.front().views;
   const std::vector<int> which = ViewsWithDepth(views);
   std::atomic<long> with_depth = 0, pixels = 0;
-  ForViews(views, which, "meshes", room, progress, [&](size_t k) {
+  ForViews(views, which, "meshes", memory_gb, progress, [&](size_t k) {
     View& view = views[static_cast<size_t>(which[k])];
     const View loaded = Loaded(view, writer.folder(), {.completed = true});
-    writer.WriteMesh(view, MakeStoredMesh(loaded, RenderOptions{}, room.threads));
+    writer.WriteMesh(view, MakeStoredMesh(loaded, RenderOptions{}));
     const auto measured = MeasuredDepth(loaded).grid().data();
     with_depth += std::ranges::count_if(measured, [](float z) { return !DepthImage::IsHole(z); });
     pixels += static_cast<long>(measured.size());

@@ -16,12 +16,12 @@ namespace dtr::pipeline {
 
 /// Scene centre, bounds and baselines: from the stored depth maps or, without any, from `points`.
 void FinishScene(DtrSet& set, std::span<const SparsePoint> points, const io::SetWriter& writer,
-                 const Room& room, Progress& progress);
+                 double memory_gb, Progress& progress);
 
 /// Stores the depth of every source view again as zstd-inverse, with 1/z off by at most `error_px`
 /// pixels of disparity from what the stereo engine gave. After FinishScene: pixels of disparity
 /// need the baselines. Throws Error where 16 bits cannot keep the bound.
-void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, const Room& room,
+void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, double memory_gb,
                  Progress& progress);
 
 /// Completed depth that is known before, of views of a set by their index.
@@ -43,7 +43,7 @@ struct KnownCompletion {
 /// rest is completed as if it had been measured. Returns the planes of the scene that cells chose
 /// among.
 std::vector<stereo::ScenePlane> CompleteDepth(DtrSet& set, const SparseScene& sparse,
-                                              io::SetWriter& writer, const Room& room,
+                                              io::SetWriter& writer, double memory_gb,
                                               Progress& progress,
                                               const KnownCompletion& known = {});
 
@@ -58,6 +58,6 @@ struct DepthCount {
 
 /// Writes the reduced mesh (SPEC 5.1) of every source view that has depth, as renderers make it
 /// with their default options. After FinishScene: thresholds need the baselines.
-DepthCount WriteMeshes(DtrSet& set, io::SetWriter& writer, const Room& room, Progress& progress);
+DepthCount WriteMeshes(DtrSet& set, io::SetWriter& writer, double memory_gb, Progress& progress);
 
 }  // namespace dtr::pipeline

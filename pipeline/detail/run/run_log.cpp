@@ -60,11 +60,11 @@ void RunLog::AddEarlier(double wall_s, double cpu_s) {
   earlier_cpu_s_ += cpu_s;
 }
 
-io::RunRecord RunLog::Record(int threads, std::vector<std::string> lines) const {
+io::RunRecord RunLog::Record(std::vector<std::string> lines) const {
   io::RunRecord record;
   record.command = CommandLineInUtf8();
   record.stages = stages_;
-  record.threads = threads;
+  record.threads = ThreadLimit::Current();
   record.log = std::move(lines);
   return record;
 }

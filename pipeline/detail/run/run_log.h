@@ -21,7 +21,7 @@ class RunLog {
   const std::vector<io::RunStage>& stages() const { return stages_; }
   /// The record of the run (its command line is this program's), with these lines, to be written
   /// by io::WriteRunRecord.
-  io::RunRecord Record(int threads, std::vector<std::string> lines = {}) const;
+  io::RunRecord Record(std::vector<std::string> lines = {}) const;
 
  private:
   std::vector<io::RunStage> stages_;

@@ -33,8 +33,8 @@ constexpr double kExact = 1e-9;  // px; what stands for 0 on a logarithmic axis
 
 /// As `dtr build` takes them.
 capture::Capture PhotosOf(const CalibrationSweepOptions& options, Progress& progress) {
-  capture::Capture photos = capture::IngestPhotos(
-      options.photos, {.threads = options.threads, .memory_gb = kDefaultMemoryGb}, progress);
+  capture::Capture photos =
+      capture::IngestPhotos(options.photos, {.memory_gb = kDefaultMemoryGb}, progress);
   (void)capture::DropSameImages(photos, [](const std::string&) { return false; });
   capture::RequireEnoughPhotos(photos, options.photos);
   return photos;
@@ -56,13 +56,13 @@ void RequirePhotosOfTheSet(const CalibrationSweepOptions& options,
 }
 
 std::vector<calib::Track> ReferenceTracksOf(const capture::Capture& photos, const fs::path& folder,
-                                            int threads, Progress& progress) {
+                                            Progress& progress) {
   const auto read = [&](int i) {
     const capture::Photo& photo = photos.photos[static_cast<size_t>(i)];
     capture::PhotoPixels pixels = capture::ReadPhotoAndMask(photo);
     return calib::ReferenceTracksPhoto{std::move(pixels.image), std::move(pixels.mask)};
   };
-  auto tracks = calib::FindTracks(static_cast<int>(photos.photos.size()), read, threads, progress);
+  auto tracks = calib::FindTracks(static_cast<int>(photos.photos.size()), read, progress);
   if (tracks.size() < calib::kMinHeldOut) {
     throw Error(fmt::format(
         "`photos` {}: expected {} points that {} or more photos show, to measure cameras by, found "
@@ -107,7 +107,7 @@ CalibrationSweep::CalibrationSweep(CalibrationSweepOptions options, Progress& pr
     longest = std::max({longest, photo.width_px, photo.height_px});
   }
   RequirePhotosOfTheSet(options_, names_);
-  tracks_ = ReferenceTracksOf(photos_, options_.photos, options_.threads, progress_);
+  tracks_ = ReferenceTracksOf(photos_, options_.photos, progress_);
   loss_scale_px_ = kLossShare * longest;
   axes_ = {{"sfm", EngineValues()},
            {"feature-size",
@@ -141,7 +141,6 @@ SfmChoice CalibrationSweep::ChoiceOf(const eval::SweepSetting& setting) const {
 eval::SweepMeasurement CalibrationSweep::Measure(const eval::SweepSetting& setting) const {
   NotesOnly notes(progress_);
   CalibrateOptions calibrate;
-  calibrate.threads = options_.threads;
   calibrate.seed = options_.seed;
   calibrate.memory_gb = kDefaultMemoryGb;
   calibrate.refine = Value(setting, kRefine) == kYes;
@@ -160,7 +159,7 @@ eval::SweepMeasurement CalibrationSweep::Measure(const eval::SweepSetting& setti
   measured.cost_least = measured.cost_most = measured.cost;
 
   const calib::ReferenceTracksScore score =
-      calib::ScoreCameras(calibrated.model, names_, tracks_, loss_scale_px_, options_.threads);
+      calib::ScoreCameras(calibrated.model, names_, tracks_, loss_scale_px_);
   measured.error = std::max(score.error_px, kExact);
   measured.figures = {{"not_registered", static_cast<double>(calibrated.not_registered.size())},
                       {"points", static_cast<double>(calibrated.model.points.size())},

@@ -24,7 +24,6 @@ struct CalibrationSweepOptions {
   /// Long sides for features to try, the first the default; 0 and what is larger: what memory
   /// allows. Empty: that, seven tenths, half.
   std::vector<int> feature_sizes_px;
-  int threads = 0;
   std::uint64_t seed = 0;
 };
 

@@ -20,12 +20,10 @@ const std::filesystem::path& Made(const std::filesystem::path& folder) {
 ScratchFolder::ScratchFolder(const std::filesystem::path& folder)
     : TemporaryFolder(Made(folder), ".measured-") {}
 
-DtrSet LoadToEvaluate(const std::filesystem::path& folder, bool sigma, int threads,
-                      Progress& progress) {
+DtrSet LoadToEvaluate(const std::filesystem::path& folder, bool sigma, Progress& progress) {
   io::LoadOptions load;
   load.held_out = load.completed = true;
   load.sigma = sigma;
-  load.threads = threads;
   load.warn = [&progress](const std::string& line) { progress.Note(line); };
   return io::LoadSet(folder, load);
 }

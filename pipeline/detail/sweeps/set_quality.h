@@ -17,8 +17,7 @@ class ScratchFolder : public TemporaryFolder {
 };
 
 /// A set with its images, depth and held-out photos.
-DtrSet LoadToEvaluate(const std::filesystem::path& folder, bool sigma, int threads,
-                      Progress& progress);
+DtrSet LoadToEvaluate(const std::filesystem::path& folder, bool sigma, Progress& progress);
 
 /// Fills in PSNR, error (RMS levels) and figures from renderings of the held-out photos, or of
 /// every source view left out in turn where there are none. Throws Error when nothing can be

@@ -63,7 +63,7 @@ double ErrorByTruth(const eval::DepthScores& scores, eval::SweepMeasurement& mea
 }  // namespace
 
 void WriteResized(const std::filesystem::path& from, const std::filesystem::path& to,
-                  int max_size_px, int threads, Progress& progress) {
+                  int max_size_px, Progress& progress) {
   DtrSet set = io::ReadSet(from);
   SparseScene sparse = io::LoadSparse(from, set);
   std::vector<Eigen::Vector2d> factors;  // of pixels, per view
@@ -72,7 +72,6 @@ void WriteResized(const std::filesystem::path& from, const std::filesystem::path
   io::SetWriter writer(to, fmt::format(R"({{"max_size_px":{}}})", max_size_px), true);
   io::LoadOptions load;
   load.depth = false;
-  load.threads = threads;
   for (View& view : set.frames.front().views) {
     progress.ThrowIfInterrupted();
     io::LoadPixels(from, view, load);
@@ -117,7 +116,7 @@ eval::SweepMeasurement StereoSweep::Measure(const eval::SweepSetting& setting) c
   NotesOnly notes(progress_);
   const ScratchFolder scratch(options_.work);
   const std::filesystem::path resized = scratch / "resized.dtr", made = scratch / "stereo.dtr";
-  WriteResized(options_.set, resized, std::stoi(value(kMaxSize)), options_.threads, notes);
+  WriteResized(options_.set, resized, std::stoi(value(kMaxSize)), notes);
 
   RecomputeOptions recompute;
   recompute.set = resized;
@@ -125,7 +124,6 @@ eval::SweepMeasurement StereoSweep::Measure(const eval::SweepSetting& setting) c
   recompute.depth.engine = value(kEngine);
   recompute.depth.preset = value(kPreset);
   recompute.force = true;
-  recompute.threads = options_.threads;
   recompute.seed = options_.seed;
   const double start_ms = ProcessCpuMilliseconds();
   const RecomputeReport report = RecomputeDepth(recompute, notes);
@@ -135,11 +133,10 @@ eval::SweepMeasurement StereoSweep::Measure(const eval::SweepSetting& setting) c
   if (other_stages_s_) measured.figures["build_cpu_s"] = *other_stages_s_ + measured.cost;
   measured.figures["share_with_depth"] = report.depth_completeness;
 
-  const DtrSet set = LoadToEvaluate(made, !options_.truth.empty(), options_.threads, notes);
+  const DtrSet set = LoadToEvaluate(made, !options_.truth.empty(), notes);
   EvaluateImages(set, options_.render, options_.make_renderer(), measured);
   if (!options_.truth.empty()) {
-    measured.error =
-        ErrorByTruth(EvaluateDepth(set, options_.truth, options_.threads, notes), measured);
+    measured.error = ErrorByTruth(EvaluateDepth(set, options_.truth, notes), measured);
   }
   return measured;
 }

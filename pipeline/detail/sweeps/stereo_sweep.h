@@ -25,7 +25,6 @@ struct StereoSweepOptions {
   RenderOptions render;
   /// Called for every measurement, as renderers may remember views by their addresses.
   std::function<eval::RenderFunction()> make_renderer;
-  int threads = 0;
   std::uint64_t seed = 0;
 };
 
@@ -53,6 +52,6 @@ class StereoSweep {
 /// Writes a copy of a set, without depth, whose source images have at most this long side; held-out
 /// photos keep theirs. Throws as SetWriter does.
 void WriteResized(const std::filesystem::path& from, const std::filesystem::path& to,
-                  int max_size_px, int threads, Progress& progress);
+                  int max_size_px, Progress& progress);
 
 }  // namespace dtr::pipeline

@@ -140,7 +140,6 @@ void StorageSweep::Write(View& view, const eval::SweepSetting& setting, LengthUn
   if (!same_depth || !same_image) {
     io::LoadOptions load;
     load.sigma = false;
-    load.threads = options_.threads;
     io::LoadPixels(options_.set, view, load);
   }
   if (Value(setting, kSigma) != kKept) view.sigma_file.reset();
@@ -170,7 +169,7 @@ eval::SweepMeasurement StorageSweep::Measure(const eval::SweepSetting& setting) 
     }
     if (Value(setting, kMesh) == kKept && setting.at(kDepth) != 0) {
       NotesOnly notes(progress_);
-      WriteMeshes(set, writer, {options_.threads, kDefaultMemoryGb}, notes);
+      WriteMeshes(set, writer, kDefaultMemoryGb, notes);
     }
     // The calibration's points are no part of what is rendered from.
     set.sparse_file.reset();
@@ -184,7 +183,7 @@ eval::SweepMeasurement StorageSweep::Measure(const eval::SweepSetting& setting) 
   DtrSet loaded;
   for (int i = 0; i < kLoads; ++i) {
     const double start_ms = ProcessCpuMilliseconds();
-    loaded = LoadToEvaluate(made, false, options_.threads, progress_);
+    loaded = LoadToEvaluate(made, false, progress_);
     load_ms.push_back(ProcessCpuMilliseconds() - start_ms);
   }
   measured.figures["load_cpu_ms"] = eval::TimesOf(load_ms).median_ms;

@@ -19,7 +19,6 @@ struct StorageSweepOptions {
   RenderOptions render;
   /// Called for every measurement, as renderers may remember views by their addresses.
   std::function<eval::RenderFunction()> make_renderer;
-  int threads = 0;
 };
 
 /// Cost: bytes of the source views' files. Error: RMS levels of images from the set read back.

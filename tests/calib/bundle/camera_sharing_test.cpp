@@ -6,6 +6,7 @@
 
 #include "dtr/base/error.h"
 #include "tests/calib/bundle/synthetic_bundle.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::calib {
 namespace {
@@ -82,8 +83,8 @@ TEST(CameraSharing, FewPointsLeaveCamerasSeparateAndSayWhy) {
 
 TEST(CameraSharing, AnyNumberOfThreadsGivesTheSameBits) {
   const SfmModel model = ModelOfFocals({900, 900});
-  const SharedCameras one = ShareCameras(model, {1, 2}, {.threads = 1});
-  const SharedCameras three = ShareCameras(model, {1, 2}, {.threads = 3});
+  const SharedCameras one = OnThreads(1, [&] { return ShareCameras(model, {1, 2}, {}); });
+  const SharedCameras three = OnThreads(3, [&] { return ShareCameras(model, {1, 2}, {}); });
   EXPECT_EQ(one.model.cameras.at(1).params, three.model.cameras.at(1).params);
   EXPECT_EQ(one.shared_px, three.shared_px);
 }

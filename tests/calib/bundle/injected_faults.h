@@ -269,14 +269,14 @@ inline Tally FaultInjectionAll(int count, std::uint64_t seed) {
   for (int k = 0; k < count; ++k) {
     Random random(HashOf(seed, static_cast<std::uint64_t>(k)));
     const Bundle honest = Honest(HashOf(seed, static_cast<std::uint64_t>(k), 5));
-    const PhotosValidation good = ValidatePhotos(honest, {}, 1);
+    const PhotosValidation good = ValidatePhotos(honest, {});
     ++tally.honest;
     tally.honest_passed += AllPassed(good.tests);
     if (!AllPassed(good.tests)) {
       std::cout << "honest " << k << ": " << BrokenTests(good.tests) << "\n";
     }
     const Faulty bad = FaultInjection(honest, k % kFaultInjections, random);
-    const PhotosValidation judged = ValidatePhotos(bad.bundle, {}, 1);
+    const PhotosValidation judged = ValidatePhotos(bad.bundle, {});
     const Check* failed = BrokenTest(judged.tests, bad.test);
     const bool named = failed != nullptr && failed->reason.find(bad.word) != std::string::npos;
     if (named || (bad.test.empty() && !AllPassed(judged.tests))) {

@@ -10,6 +10,7 @@
 #include "calib/similarity.h"
 #include "dtr/base/error.h"
 #include "tests/calib/bundle/synthetic_bundle.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::calib {
 namespace {
@@ -276,9 +277,10 @@ TEST(RefineInMetres, TheGaugeIsThatOfThePlaces) {
 TEST(RefineInMetres, TheSameForAnyNumberOfThreads) {
   const Bundle truth = MakeBundle({.points = 400, .noise_px = 0.3});
   RefineOptions options;
-  options.threads = 1;
+  std::optional<ThreadLimit> limit;
+  limit.emplace(1);
   const Held one = Hold(ModelFrom(truth), Places(truth, 0.05), options);
-  options.threads = 4;
+  limit.emplace(4);
   const Held four = Hold(ModelFrom(truth), Places(truth, 0.05), options);
   EXPECT_EQ(ToJson(one.refined), ToJson(four.refined));
   EXPECT_EQ(CentresOf(one.refined.model), CentresOf(four.refined.model));

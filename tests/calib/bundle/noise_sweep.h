@@ -169,10 +169,10 @@ inline std::vector<Check> ValidationOf(const calib::Bundle& bundle, double noise
     return std::pair(a.view, a.point) < std::pair(b.view, b.point);
   });
   std::vector<Check> tests =
-      calib::ValidateReprojection(cameras, poses, scene, limits, names, 1).tests;
+      calib::ValidateReprojection(cameras, poses, scene, limits, names).tests;
   calib::BundleLimits judge;
   judge.max_image_shift_px *= scale;
-  const calib::PhotosValidation judgement = calib::ValidatePhotos(bundle, judge, 1);
+  const calib::PhotosValidation judgement = calib::ValidatePhotos(bundle, judge);
   tests.insert(tests.end(), judgement.tests.begin(), judgement.tests.end());
   return tests;
 }

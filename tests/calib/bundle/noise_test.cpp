@@ -82,7 +82,7 @@ TEST(NoiseSweep, AnOrbitAtOneHeightLeavesIntrinsicsOpenAndSaysSo) {
   const auto names = [](SceneKind kind, double noise_px) {
     std::string found;
     for (const Degeneracy& d :
-         ValidatePhotos(NoisyScene(kind, noise_px, 15, 150), {}, 1).degeneracies) {
+         ValidatePhotos(NoisyScene(kind, noise_px, 15, 150), {}).degeneracies) {
       found += d.name + (d.harmful ? " harmful " : " ");
     }
     return found;

@@ -13,6 +13,7 @@
 #include "calib/similarity.h"
 #include "dtr/base/error.h"
 #include "tests/calib/bundle/synthetic_bundle.h"
+#include "tests/support/on_threads.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::calib {
@@ -183,9 +184,10 @@ TEST(Refine, TheSameForAnyNumberOfThreads) {
   SfmModel model = ModelFrom(MakeBundle(Noisy()));
   model.cameras[1].params[1] += 12;
   RefineOptions options;
-  options.threads = 1;
+  std::optional<ThreadLimit> limit;
+  limit.emplace(1);
   const Refined one = Refine(model, options);
-  options.threads = 4;
+  limit.emplace(4);
   const Refined four = Refine(model, options);
   EXPECT_EQ(ToJson(one), ToJson(four));
   EXPECT_EQ(one.model.cameras.at(1).params, four.model.cameras.at(1).params);

@@ -7,6 +7,7 @@
 
 #include "dtr/base/files.h"
 #include "tests/calib/colmap/run_sfm_with_fake.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::colmap {
 namespace {
@@ -174,7 +175,7 @@ TEST_F(FeaturesWithFake, DatabaseThatIsNoneIsNamed) {
 TEST(PlanExtraction, FillsTheMemoryAndNeverMore) {
   const std::vector<SfmImageInput> photos(11, {"a.jpg", 2832, 2128, std::nullopt, ""});
   const auto plan = [&](int threads, double memory_gb, int side_px) {
-    return PlanExtraction(photos, threads, memory_gb, side_px);
+    return OnThreads(threads, [&] { return PlanExtraction(photos, memory_gb, side_px); });
   };
   EXPECT_EQ(plan(2, 4, 0).threads, 2);
   EXPECT_EQ(plan(2, 4, 0).max_image_size_px, kPreferredSidePx);

@@ -247,7 +247,7 @@ TEST_F(AutoSfm, AStraightWalkIsMappedWithExifsFocalLength) {
   auto walk = std::find_if(sets.begin(), sets.end(),
                            [](const auto& set) { return set.name == "straight_walk"; });
   ASSERT_NE(walk, sets.end());
-  datasets::WriteHardSet(*walk, folder_ / "walk", 0);
+  datasets::WriteHardSet(*walk, folder_ / "walk");
   inputs_.clear();
   const auto truth = io::ReadCamerasJson(folder_ / "walk" / "cameras.json").cameras;
   for (const auto& camera : truth) {

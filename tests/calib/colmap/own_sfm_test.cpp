@@ -12,6 +12,7 @@
 #include "tests/calib/colmap/plaza_truth.h"
 #include "tests/support/environment.h"
 #include "tests/support/message_of.h"
+#include "tests/support/on_threads.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::colmap {
@@ -99,10 +100,11 @@ TEST_F(OwnSfm, TriangulatesAndColoursThePointsOfGivenCameras) {
 }
 
 TEST_F(OwnSfm, GivesTheSameModelForAnyNumberOfThreadsAndFromItsCheckpoints) {
-  options_.threads = 1;
+  std::optional<ThreadLimit> limit;
+  limit.emplace(1);
   const calib::SfmModel one = Run(folder_ / "one").model;
   ExpectSame(one, Run(folder_ / "one").model);
-  options_.threads = 3;
+  limit.emplace(3);
   ExpectSame(one, Run(folder_ / "three").model);
 }
 

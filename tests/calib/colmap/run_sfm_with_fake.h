@@ -46,7 +46,6 @@ class RunSfmWithFake : public ::testing::Test {
       images_.push_back({name, 640, 480, 500.0, "camera one"});
     }
     options_.engine = SfmEngine::kColmap;
-    options_.threads = 2;
     fake_.LeaveDatabase(Aliases());
     LeaveModel(0, 2);
     LeaveModel(1, 3);

@@ -10,6 +10,7 @@
 #include "dtr/io/formats/cameras_json.h"
 #include "dtr/io/image_io.h"
 #include "tests/calib/bundle/synthetic_bundle.h"
+#include "tests/support/on_threads.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::testing {
@@ -39,7 +40,7 @@ struct Scene {
   std::vector<Track> tracks = TracksOf(bundle);
   std::vector<std::string> photos = calib::ImageNames(model);
   ReferenceTracksScore Score(const SfmModel& cameras, int threads = 1) const {
-    return ScoreCameras(cameras, photos, tracks, kScalePx, threads);
+    return OnThreads(threads, [&] { return ScoreCameras(cameras, photos, tracks, kScalePx); });
   }
 };
 
@@ -124,7 +125,7 @@ class RenderedReferenceTracks : public ::testing::Test {
     spec.width_px = 480;
     spec.height_px = 320;
     SilentProgress silent;
-    datasets::MakeDataset(spec, folder_ / "made", 2, silent);
+    datasets::MakeDataset(spec, folder_ / "made", silent);
     const io::CameraList list = io::ReadCamerasJson(folder_ / "made/cameras.json");
     for (const io::NamedCamera& named : list.cameras) {
       const PinholeCamera& c = named.camera;
@@ -138,16 +139,18 @@ class RenderedReferenceTracks : public ::testing::Test {
   }
   std::vector<Track> Find(int threads, const Mask& mask = {}) const {
     SilentProgress silent;
-    return calib::FindTracks(
-        kPhotos,
-        [&](int i) {
-          const std::string& name = model_.images[static_cast<size_t>(i)].name;
-          return calib::ReferenceTracksPhoto{io::ReadImage(folder_ / "made/images" / name), mask};
-        },
-        threads, silent);
+    return OnThreads(threads, [&] {
+      return calib::FindTracks(
+          kPhotos,
+          [&](int i) {
+            const std::string& name = model_.images[static_cast<size_t>(i)].name;
+            return calib::ReferenceTracksPhoto{io::ReadImage(folder_ / "made/images" / name), mask};
+          },
+          silent);
+    });
   }
   ReferenceTracksScore Score(const SfmModel& model, const std::vector<Track>& tracks) const {
-    return ScoreCameras(model, calib::ImageNames(model_), tracks, 1, 0);
+    return ScoreCameras(model, calib::ImageNames(model_), tracks, 1);
   }
 
   TemporaryFolder folder_;

@@ -8,6 +8,7 @@
 
 #include "dtr/base/error.h"
 #include "tests/calib/solve/synthetic_views.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::calib {
 namespace {
@@ -20,7 +21,7 @@ using testing::TypicalCamera;
 ModelChoice Choose(const std::vector<BoardView>& views, int threads = 0) {
   ChoiceOptions options;
   options.folds = 5;
-  options.threads = threads;
+  const ThreadLimit limit(threads);
   return ChooseModel(kBoard, views, 640, 480, options);
 }
 

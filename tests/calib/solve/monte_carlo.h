@@ -63,7 +63,7 @@ inline MonteCarlo RunMonteCarlo(BoardModel model, int solves, int views, double 
   const LensCamera truth = TypicalCamera(model);
   const SyntheticViews exact = ExactViews(truth, views, 11);
   std::vector<SolveError> errors(static_cast<size_t>(solves));
-  ParallelFor(0, solves, 0, [&](int k) {
+  ParallelFor(0, solves, [&](int k) {
     const auto noisy = Noisy(exact.views, sigma_px, 1000 + static_cast<std::uint64_t>(k));
     const BoardSolution solution = SolveBoard(kBoard, noisy, 640, 480, model);
     errors[static_cast<size_t>(k)] = ErrorOf(solution, truth, exact, sigma_px);

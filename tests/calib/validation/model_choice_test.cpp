@@ -32,7 +32,7 @@ const std::vector<BoardView>& Views() {
     for (const auto& entry : fs::directory_iterator(Photos())) files.push_back(entry.path());
     std::sort(files.begin(), files.end());
     std::vector<Detection> found(files.size());
-    ParallelFor(0, static_cast<int>(files.size()), 0, [&](int i) {
+    ParallelFor(0, static_cast<int>(files.size()), [&](int i) {
       const auto at = static_cast<size_t>(i);
       const ImageRgb8 image = io::ReadImage(files[at]);
       if (image.width() != kWidth || image.height() != kHeight) return;  // two are a pixel larger

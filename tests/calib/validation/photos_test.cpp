@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/calib/bundle/injected_faults.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::calib {
 namespace {
@@ -110,7 +111,8 @@ TEST(ValidatePhotos, OrdinaryScenesHaveNoDegeneracy) {
 
 TEST(ValidatePhotos, TheSameForAnyNumberOfThreads) {
   const Bundle bundle = Honest(6);
-  EXPECT_EQ(ToJson(ValidatePhotos(bundle, {}, 1)), ToJson(ValidatePhotos(bundle, {}, 4)));
+  EXPECT_EQ(ToJson(OnThreads(1, [&] { return ValidatePhotos(bundle, {}); })),
+            ToJson(OnThreads(4, [&] { return ValidatePhotos(bundle, {}); })));
 }
 
 const Check* TestOf(const PhotosValidation& judgement, const std::string& name) {

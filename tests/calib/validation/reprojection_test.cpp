@@ -14,6 +14,7 @@
 #include "calib/triangulate.h"
 #include "dtr/base/error.h"
 #include "dtr/base/random.h"
+#include "tests/support/on_threads.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::calib {
@@ -31,7 +32,8 @@ struct Calibration {
   std::vector<std::string> names;
   SparseScene scene;
   ValidationReport Validate(const ValidateLimits& limits = {}, int threads = 0) const {
-    return ValidateReprojection(cameras, poses, scene, limits, names, threads);
+    return OnThreads(threads,
+                     [&] { return ValidateReprojection(cameras, poses, scene, limits, names); });
   }
 };
 
@@ -275,7 +277,7 @@ TEST(Validate, StrictlyHeldOutCamerasAreKeptApartAndOthersAreNot) {
     return o.view == 2 || o.view == 5 || (o.view == 3 && o.point >= 7);
   });
   const auto validate = [&](std::vector<bool> held_out) {
-    return ValidateReprojection(c.cameras, c.poses, c.scene, {}, c.names, 0, held_out);
+    return ValidateReprojection(c.cameras, c.poses, c.scene, {}, c.names, held_out);
   };
   const ValidationReport open = validate({});
   EXPECT_THAT(open.untested, ::testing::ElementsAre("view2", "view3", "view5"));

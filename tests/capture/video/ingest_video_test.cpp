@@ -8,6 +8,7 @@
 #include "dtr/base/error.h"
 #include "tests/capture/photo_files.h"
 #include "tests/capture/video/moving_image.h"
+#include "tests/support/on_threads.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::capture {
@@ -43,8 +44,7 @@ std::vector<std::string> NamesOf(const Capture& capture) {
 TEST(IngestVideos, TakesEveryNthFrameAndSaysWhichItIs) {
   const TemporaryFolder folder;
   WriteVideo(folder / "walk.avi", Places(25, 4));
-  const Capture capture =
-      Ingest({folder / "walk.avi"}, {.every = 10, .threads = 2}, folder / "frames");
+  const Capture capture = Ingest({folder / "walk.avi"}, {.every = 10}, folder / "frames");
   ASSERT_THAT(NamesOf(capture),
               ElementsAre("frame_000000.jpg", "frame_000010.jpg", "frame_000020.jpg"));
   const Photo& second = capture.photos[1];
@@ -62,7 +62,7 @@ TEST(IngestVideos, TakesEveryNthFrameAndSaysWhichItIs) {
   }
   EXPECT_LT(difference / 200, 4);  // what Motion JPEG and JPEG lose
   // A capture keeps it.
-  WriteCapture(capture, folder / "capture", 2);
+  WriteCapture(capture, folder / "capture");
   const Capture read = ReadCapture(folder / "capture");
   ASSERT_TRUE(read.photos[1].video_frame);
   EXPECT_EQ(read.photos[1].video_frame->number, 10);
@@ -84,8 +84,10 @@ TEST(IngestVideos, FramesArePhotosWhateverTheVideosAreCalled) {
 TEST(IngestVideos, ChoosesByMotionTheSameFramesForAnyNumberOfThreads) {
   const TemporaryFolder folder;
   WriteVideo(folder / "walk.avi", Places(40, 4));
-  const Capture one = Ingest({folder / "walk.avi"}, {.threads = 1}, folder / "one");
-  const Capture two = Ingest({folder / "walk.avi"}, {.threads = 2}, folder / "two");
+  const Capture one =
+      OnThreads(1, [&] { return Ingest({folder / "walk.avi"}, {}, folder / "one"); });
+  const Capture two =
+      OnThreads(2, [&] { return Ingest({folder / "walk.avi"}, {}, folder / "two"); });
   EXPECT_GE(one.photos.size(), 6u);  // 160 px of way, 0.06 of 320 px between two
   EXPECT_LE(one.photos.size(), 12u);
   ASSERT_EQ(NamesOf(one), NamesOf(two));

@@ -12,6 +12,7 @@
 #include "calib/models/lens_formula.h"
 #include "dtr/base/error.h"
 #include "tests/calib/bundle/synthetic_bundle.h"
+#include "tests/support/on_threads.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::calib {
@@ -112,14 +113,14 @@ TEST(PlainAdjust, GradientAgreesWithDifferencesOfTheCost) {
     const plain::Layout layout(problem);
     plain::NormalEquations normal(problem, layout);
     plain::Unknowns x{n.theta, n.motion, n.place, n.shift};
-    normal.Build(x, 1e-4, 1);
+    normal.Build(x, 1e-4);
     constexpr double kStep = 1e-6;
     const auto difference = [&](double& unknown) {
       const double here = unknown;
       unknown = here + kStep;
-      const double ahead = problem.CostAt(x, 1);
+      const double ahead = problem.CostAt(x);
       unknown = here - kStep;
-      const double behind = problem.CostAt(x, 1);
+      const double behind = problem.CostAt(x);
       unknown = here;
       return (ahead - behind) / (2 * kStep);
     };
@@ -220,7 +221,6 @@ TEST(PlainAdjust, ManyPhotosOfOneObjectAreSolvedIteratively) {
   PlainOptions options;
   options.max_iterations = 2;
   AdjustPlain(options, {}, by_one);
-  options.threads = 2;
   AdjustPlain(options, {}, by_two);
   EXPECT_EQ(LargestDifference(Projections(by_one), Projections(by_two)), 0);
 }
@@ -256,9 +256,8 @@ TEST(PlainAdjust, TheSameBytesForAnyNumberOfThreads) {
   ASSERT_GT(start.observations.size(), 20000u) << "several parts";
   PlainOptions options;
   Bundle one = start, three = start;
-  AdjustPlain(options, {}, one);
-  options.threads = 3;
-  AdjustPlain(options, {}, three);
+  OnThreads(1, [&] { return AdjustPlain(options, {}, one); });
+  OnThreads(3, [&] { return AdjustPlain(options, {}, three); });
   EXPECT_EQ(one.lenses[0].params, three.lenses[0].params);
   EXPECT_EQ(one.points, three.points);
   for (size_t i = 0; i < one.images.size(); ++i) {

@@ -7,6 +7,7 @@
 #include "calib/sfm/mapping/model_check.h"
 #include "calib/sfm/matching/planar_poses.h"
 #include "tests/calib/sfm/mapping/synthetic_graph.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::sfm {
 namespace {
@@ -422,20 +423,20 @@ TEST(WhyContradicted, AModelOfTheMatchesPassesAndOneOfMixedUpPhotosDoesNot) {
   const Seen seen = GraphOf(testing::Ring(12));
   calib::SfmModel model = MapGlobally(seen.graph, {}).model;
   ASSERT_EQ(model.images.size(), 12u);
-  EXPECT_EQ(WhyContradicted(seen.graph, model, 1), "");
+  EXPECT_EQ(WhyContradicted(seen.graph, model), "");
   calib::SfmModel mixed_up = model;
   std::swap(mixed_up.images[1].cam_from_world, mixed_up.images[5].cam_from_world);
-  EXPECT_THAT(WhyContradicted(seen.graph, mixed_up, 1), ::testing::HasSubstr("contradict"));
+  EXPECT_THAT(WhyContradicted(seen.graph, mixed_up), ::testing::HasSubstr("contradict"));
   calib::SfmModel without_points = model;
   without_points.points.clear();
-  EXPECT_THAT(WhyContradicted(seen.graph, without_points, 1),
+  EXPECT_THAT(WhyContradicted(seen.graph, without_points),
               ::testing::HasSubstr("only 0 % of the matches became points"));
   ViewGraph zoomed = seen.graph;
   zoomed.focal_is_known[0] = 1;
   zoomed.cameras[0].params[0] *= 2.2;
-  EXPECT_THAT(WhyContradicted(zoomed, model, 1), ::testing::HasSubstr("camera_per"));
+  EXPECT_THAT(WhyContradicted(zoomed, model), ::testing::HasSubstr("camera_per"));
   model.images[0].name = "another.jpg";
-  EXPECT_THROW(WhyContradicted(seen.graph, model, 1), std::invalid_argument);
+  EXPECT_THROW(WhyContradicted(seen.graph, model), std::invalid_argument);
 }
 
 TEST(GlobalMapper, APhotoWithoutMatchesIsLeftOutAndNamed) {
@@ -452,7 +453,8 @@ TEST(GlobalMapper, APhotoWithoutMatchesIsLeftOutAndNamed) {
 
 TEST(GlobalMapper, TheNumberOfThreadsDoesNotChangeABit) {
   const ViewGraph graph = GraphOf(testing::Ring(10)).graph;
-  const Mapped one = MapGlobally(graph, {.threads = 1}), three = MapGlobally(graph, {.threads = 3});
+  const Mapped one = OnThreads(1, [&] { return MapGlobally(graph, {}); });
+  const Mapped three = OnThreads(3, [&] { return MapGlobally(graph, {}); });
   ASSERT_EQ(one.model.images.size(), three.model.images.size());
   for (size_t i = 0; i < one.model.images.size(); ++i) {
     const Pose &a = one.model.images[i].cam_from_world, &b = three.model.images[i].cam_from_world;

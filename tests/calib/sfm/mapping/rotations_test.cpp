@@ -130,9 +130,9 @@ TEST(PairPoses, AnUncertainRotationSaysSo) {
     testing::GraphSpec spec;
     spec.kind = PairKind::kUncalibrated;
     const testing::Seen seen = testing::GraphOf(scene, spec);
-    const Rays rays = RaysOf(seen.graph, seen.graph.cameras, 1);
+    const Rays rays = RaysOf(seen.graph, seen.graph.cameras);
     const std::vector<double> sigmas(2, 1 / 700.0);
-    const auto rotations = RelativeRotationsOf(seen.graph, rays, sigmas, 1);
+    const auto rotations = RelativeRotationsOf(seen.graph, rays, sigmas);
     ASSERT_EQ(rotations.size(), 1u);
     ASSERT_TRUE(rotations[0]);
     const Matrix3d exact = scene.cam_from_world[1].rotation.toRotationMatrix() *

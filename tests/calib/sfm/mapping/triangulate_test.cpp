@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "tests/calib/sfm/mapping/synthetic_graph.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::sfm {
 namespace {
@@ -35,7 +36,7 @@ TEST(TriangulateMatches, FindsThePointsThatGivenCamerasSee) {
   GraphSpec spec;
   spec.outlier_share = 0.1;
   const Seen seen = GraphOf(scene, spec);
-  const calib::SfmModel model = TriangulateMatches(seen.graph, scene.cam_from_world, 0);
+  const calib::SfmModel model = TriangulateMatches(seen.graph, scene.cam_from_world);
 
   ASSERT_EQ(model.images.size(), scene.images());
   for (const calib::SfmImage& image : model.images) {
@@ -56,7 +57,7 @@ TEST(TriangulateMatches, AnObservationShowsTheImageOfThePoint) {
   GraphSpec exact;
   exact.noise_px = exact.outlier_share = 0;
   const Seen seen = GraphOf(scene, exact);
-  const calib::SfmModel model = TriangulateMatches(seen.graph, scene.cam_from_world, 1);
+  const calib::SfmModel model = TriangulateMatches(seen.graph, scene.cam_from_world);
   size_t observations = 0;
   for (const calib::SfmImage& image : model.images) {
     const auto& shows = seen.shows[image.id - 1];
@@ -75,22 +76,27 @@ TEST(TriangulateMatches, WrongCamerasHaveNoPoints) {
   std::vector<Pose> wrong;  // neighbours stand 135 degrees apart
   for (size_t i = 0; i < 8; ++i) wrong.push_back(scene.cam_from_world[3 * i % 8]);
   const Seen seen = GraphOf(scene);
-  const size_t right = TriangulateMatches(seen.graph, scene.cam_from_world, 0).points.size();
+  const size_t right = TriangulateMatches(seen.graph, scene.cam_from_world).points.size();
   // Matches fit a point by chance alone.
-  EXPECT_LT(TriangulateMatches(seen.graph, wrong, 0).points.size(), right / 4);
+  EXPECT_LT(TriangulateMatches(seen.graph, wrong).points.size(), right / 4);
 }
 
 TEST(TriangulateMatches, ThreadsChangeNoBitAndOnePosePerImageIsAsked) {
   const Scene scene = testing::Ring(6, 300);
   const Seen seen = GraphOf(scene);
-  const auto one = TriangulateMatches(seen.graph, scene.cam_from_world, 1);
-  const auto three = TriangulateMatches(seen.graph, scene.cam_from_world, 3);
+  const auto one =
+      OnThreads(1, [&] { return TriangulateMatches(seen.graph, scene.cam_from_world); });
+  const auto three =
+      OnThreads(3, [&] { return TriangulateMatches(seen.graph, scene.cam_from_world); });
   ASSERT_EQ(one.points.size(), three.points.size());
   for (const auto& [id, point] : one.points) {
     EXPECT_EQ(point.p_in_world, three.points.at(id).p_in_world);
   }
-  EXPECT_THROW(TriangulateMatches(seen.graph, std::span(scene.cam_from_world).first(5), 1),
-               std::invalid_argument);
+  EXPECT_THROW(
+      OnThreads(
+          1,
+          [&] { return TriangulateMatches(seen.graph, std::span(scene.cam_from_world).first(5)); }),
+      std::invalid_argument);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 
 #include "calib/sfm/matching/match_photos.h"
 #include "dtr/base/random.h"
+#include "tests/support/on_threads.h"
 
 namespace dtr::sfm {
 
@@ -98,7 +99,7 @@ inline MatchPhoto Photo(const World& world, const Where& where, const calib::Len
 inline MatchResult Match(const std::vector<MatchPhoto>& photos, const calib::LensCamera& camera,
                          bool known, int threads = 2) {
   MatchOptions options;
-  options.threads = threads;
+  const ThreadLimit limit(threads);
   if (known) options.lens_is_known.assign(1, true);
   return MatchPhotos(photos, std::vector{camera}, {known}, options);
 }

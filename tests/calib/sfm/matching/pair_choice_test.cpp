@@ -60,7 +60,7 @@ TEST(Vocabulary, WordsAreWhatLooksAlike) {
       kind.push_back(k);
     }
   }
-  const Vocabulary vocabulary(sample, 40, 1, 1);
+  const Vocabulary vocabulary(sample, 40, 1);
   EXPECT_GE(vocabulary.Size(), 20u);
   EXPECT_LE(vocabulary.Size(), 60u);
   const std::vector<int> words = vocabulary.WordsOf(sample);
@@ -71,21 +71,23 @@ TEST(Vocabulary, WordsAreWhatLooksAlike) {
     apart += kind[i] == kind[i + 1] && words[i] != words[i + 1];
   }
   EXPECT_LT(apart, 60);  // of 1160: k-means may cut a few kinds in two
-  EXPECT_EQ(Vocabulary(sample, 40, 1, 3).WordsOf(sample), words);
+  const ThreadLimit limit(3);
+  EXPECT_EQ(Vocabulary(sample, 40, 1).WordsOf(sample), words);
 }
 
 TEST(Vocabulary, NothingAndOneDescriptorAreWords) {
-  EXPECT_TRUE(Vocabulary({}, 10, 1, 1).WordsOf({}).empty());
+  EXPECT_TRUE(Vocabulary({}, 10, 1).WordsOf({}).empty());
   const std::vector<Descriptor> one{Descriptor{}};
-  EXPECT_EQ(Vocabulary(one, 0, 1, 1).WordsOf(one), std::vector<int>{0});
+  EXPECT_EQ(Vocabulary(one, 0, 1).WordsOf(one), std::vector<int>{0});
 }
 
 TEST(PhotoIndex, RanksNeighboursOfAWalkFirst) {
   const auto descriptors = Walk(0.25, 5);
   SilentProgress progress;
   const auto of = [&](int i) { return descriptors[static_cast<size_t>(i)]; };
-  const PhotoIndex index(kPhotos, of, 1, 2, progress);
-  const PhotoIndex again(kPhotos, of, 1, 1, progress);
+  const PhotoIndex index(kPhotos, of, 1, progress);
+  const ThreadLimit limit(1);
+  const PhotoIndex again(kPhotos, of, 1, progress);
   int found = 0, all = 0;
   for (int a = 0; a < kPhotos; ++a) {
     const std::vector<float> scores = index.ScoresOf(a);
@@ -112,10 +114,10 @@ TEST(PhotoIndex, WhatIsInEveryPhotoTellsNoneFromAnother) {
   std::vector<Descriptor> same;
   for (int k = 0; k < 20; ++k) same.push_back(Near(look, 0.0, random));
   const PhotoIndex index(
-      100, [&](int) { return same; }, 1, 1, progress);
+      100, [&](int) { return same; }, 1, progress);
   for (const float score : index.ScoresOf(7)) EXPECT_EQ(score, 0);
   const PhotoIndex empty(
-      3, [](int) { return std::vector<Descriptor>{}; }, 1, 1, progress);
+      3, [](int) { return std::vector<Descriptor>{}; }, 1, progress);
   EXPECT_EQ(empty.ScoresOf(1), std::vector<float>(3, 0));
 }
 
@@ -132,7 +134,7 @@ TEST(ChoosePairs, AnIndexLosesNoNeighbourOfManyPhotos) {
       EXPECT_TRUE(std::binary_search(pairs.begin(), pairs.end(), std::pair(a, b))) << a << " " << b;
     }
   }
-  options.threads = 3;
+  const ThreadLimit limit(3);
   EXPECT_EQ(ChoosePairs(photos, options, progress), pairs);
 }
 

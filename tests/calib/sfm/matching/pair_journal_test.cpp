@@ -55,7 +55,6 @@ class OfFiles {
 
   MatchOptions Options() {
     MatchOptions options;
-    options.threads = 1;
     options.load_descriptors = [this](int photo, size_t largest) {
       ++loads_;
       const auto& all = whole_[static_cast<size_t>(photo)].features.descriptors;
@@ -75,7 +74,7 @@ class OfFiles {
     return MatchPhotos(photos_, std::vector{Camera(1200)}, {false}, options);
   }
   MatchResult InMemory() const {
-    return MatchPhotos(whole_, std::vector{Camera(1200)}, {false}, {.threads = 1});
+    return MatchPhotos(whole_, std::vector{Camera(1200)}, {false}, {});
   }
   int TakeLoads() { return std::exchange(loads_, 0); }
 
