@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "dtr/base/batches.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/lower_case.h"
@@ -31,7 +32,8 @@ namespace fs = std::filesystem;
 class FrameSink {
  public:
   FrameSink(const RenderRequest& request, const std::vector<NovelFrame>& frames)
-      : output_(request.output) {
+      : output_(request.output),
+        images_(BytesOfLargest(frames), [](Image& image) { Write(image); }) {
     if (output_.extension() == ".mp4") {
       video_.emplace(output_, io::kVideoFramesPerSecond);
     } else if (request.several()) {
@@ -40,31 +42,50 @@ class FrameSink {
       folder_.emplace(output_, "frames", names, request.force);
     }
   }
-  std::string Add(const NovelFrame& camera, const RenderResult& result, bool filled) {
+  std::string Add(const NovelFrame& camera, RenderResult&& result, bool filled) {
     if (video_) {
       video_->Add(result.image);
       return output_.string();
     }
     const fs::path file = folder_ ? output_ / FileOf(camera) : output_;
     // What no view saw is black with alpha 0, unless it was filled.
-    if (filled || LowerExtension(file) != ".png") {
-      io::WriteImage(file, result.image, io::kDefaultJpegQuality, io::Mark::kRendered);
-    } else {
-      io::WriteImageWithAlpha(file, result.image, result.coverage, io::Mark::kRendered);
-    }
+    const bool opaque = filled || LowerExtension(file) != ".png";
+    images_.Add({file, std::move(result.image), opaque ? Mask() : std::move(result.coverage)});
     return file.string();
   }
   void Finish(const Progress& progress) {
     if (video_) video_->Finish(progress);
+    images_.Finish();
     if (folder_) folder_->Finish();
   }
 
  private:
+  struct Image {
+    fs::path file;
+    ImageRgb8 pixels;
+    Mask alpha;  ///< empty: opaque
+  };
+
   static std::string FileOf(const NovelFrame& frame) { return frame.name + ".png"; }
+  static double BytesOfLargest(const std::vector<NovelFrame>& frames) {
+    double bytes = 1;
+    for (const NovelFrame& frame : frames) {
+      bytes = std::max(bytes, 4.0 * frame.camera.width_px() * frame.camera.height_px());
+    }
+    return bytes;
+  }
+  static void Write(const Image& image) {
+    if (image.alpha.empty()) {
+      io::WriteImage(image.file, image.pixels, io::kDefaultJpegQuality, io::Mark::kRendered);
+    } else {
+      io::WriteImageWithAlpha(image.file, image.pixels, image.alpha, io::Mark::kRendered);
+    }
+  }
 
   fs::path output_;
   std::optional<OutputFolder> folder_;
   std::optional<io::VideoWriter> video_;
+  Batches<Image> images_;
 };
 
 void RequireOneOutput(const RenderRequest& request) {
@@ -130,9 +151,8 @@ size_t FrameShown(const RenderRequest& request, const DtrSet& set, size_t i, siz
   return request.frame ? *request.frame : TimeStepOfImage(i, count, set.frames.size());
 }
 
-RenderedFile Facts(const std::string& file, double ms, size_t frame, const RenderScene& scene,
-                   const RenderResult& result) {
-  RenderedFile facts{file, ms, frame, {}, result.coverage_share};
+RenderedFile Facts(double ms, size_t frame, const RenderScene& scene, const RenderResult& result) {
+  RenderedFile facts{{}, ms, frame, {}, result.coverage_share};
   for (const int index : result.views_used) {
     facts.views_used.push_back(scene.views[static_cast<size_t>(index)]->name);
   }
@@ -169,15 +189,15 @@ RenderReport Render(const RenderRequest& request,
       stream.Prefetch(cameras[i + 1].cam_from_world, render);
     }
     const auto start = std::chrono::steady_clock::now();
-    const RenderResult result = draw(scene, novel.camera, novel.cam_from_world, render);
+    RenderResult result = draw(scene, novel.camera, novel.cam_from_world, render);
     const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start;
     if (result.views_used.empty()) {
       progress.Note(fmt::format("WARNING: {}: no view is valid for this camera: the image is empty",
                                 novel.name));
     }
-    const std::string file = sink.Add(novel, result, render.fill_holes);
     WritePlanes(request, result);
-    report.frames.push_back(Facts(file, ms.count(), shown(i), scene, result));
+    report.frames.push_back(Facts(ms.count(), shown(i), scene, result));
+    report.frames.back().file = sink.Add(novel, std::move(result), render.fill_holes);
     progress.Update(static_cast<int>(i) + 1);
   }
   sink.Finish(progress);

@@ -46,7 +46,10 @@ class SmallSources {
  public:
   explicit SmallSources(const Frozen& frozen) : files_(frozen.files) {}
   std::span<const SmallFeatures> Features(Progress& progress) {
-    std::call_once(once_, [&] { features_ = SmallFeaturesOfFiles(files_, 0, progress); });
+    std::call_once(once_, [&] {
+      const ThreadLimit one(1);
+      features_ = SmallFeaturesOfFiles(files_, 0, progress);
+    });
     return features_;
   }
 

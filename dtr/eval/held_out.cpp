@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <stdexcept>
 
+#include "dtr/base/batches.h"
 #include "dtr/base/error.h"
 #include "dtr/eval/metrics.h"
 
@@ -14,6 +15,7 @@ namespace {
 constexpr int kDifferenceGain = 4;  // an error of 2 levels of 255 is visible, 64 saturate
 constexpr int kGapPx = 4;
 constexpr std::uint8_t kGapGrey = 128;
+constexpr double kResultBytesPerPixel = 16;
 
 std::vector<const View*> ViewsToCompare(const DtrSet& set, bool leave_one_out) {
   std::vector<const View*> views;
@@ -74,6 +76,13 @@ ViewScore Score(const View& view, const RenderResult& filled) {
   return score;
 }
 
+struct Rendered {
+  size_t index;  ///< among the views that are compared
+  const View* view;
+  RenderResult filled;
+  double ms;
+};
+
 /// Mean of a figure over the views that have it.
 std::optional<double> MeanOf(const std::vector<ViewScore>& views,
                              std::optional<double> ViewScore::*figure) {
@@ -101,20 +110,31 @@ EvaluationReport EvaluateHeldOut(const DtrSet& set, const EvaluateOptions& optio
   report.leave_one_out = options.leave_one_out;
   report.not_registered = options.not_registered;
   progress.Stage("evaluate", static_cast<int>(views.size()));
+  report.views.resize(views.size());
+  double largest_px = 1;
   for (const View* view : views) {
+    largest_px = std::max(largest_px, 1.0 * view->camera.width_px() * view->camera.height_px());
+  }
+  Batches<Rendered> rendered(kResultBytesPerPixel * largest_px, [&](Rendered& frame) {
+    ViewScore& score = report.views[frame.index];
+    score = Score(*frame.view, frame.filled);
+    score.render_ms = frame.ms;
+    if (options.on_rendered) options.on_rendered(*frame.view, frame.filled);
+  });
+  for (size_t i = 0; i < views.size(); ++i) {
+    const View* const view = views[i];
     progress.ThrowIfInterrupted();
     std::vector<std::string> excluded;
     if (options.leave_one_out) excluded.push_back(view->id);
     const RenderScene scene = MakeRenderScene(set, excluded);
     const auto start = std::chrono::steady_clock::now();
-    const RenderResult filled = render(scene, view->camera, view->cam_from_world, render_options);
+    RenderResult filled = render(scene, view->camera, view->cam_from_world, render_options);
     const std::chrono::duration<double, std::milli> elapsed =
         std::chrono::steady_clock::now() - start;
-    report.views.push_back(Score(*view, filled));
-    report.views.back().render_ms = elapsed.count();
-    if (options.on_rendered) options.on_rendered(*view, filled);
-    progress.Update(static_cast<int>(report.views.size()));
+    rendered.Add({i, view, std::move(filled), elapsed.count()});
+    progress.Update(static_cast<int>(i) + 1);
   }
+  rendered.Finish();
 
   ViewScore& mean = report.mean;
   mean.name = "mean";

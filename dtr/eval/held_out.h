@@ -26,7 +26,7 @@ struct EvaluateOptions {
   RenderOptions render;  ///< fill_holes is set by the evaluation
   /// Held-out photos without a pose: counted in the report, as no view could be rendered for them.
   std::vector<std::string> not_registered;
-  /// Called with every rendering, one view after the other, for those who want to look at them.
+  /// Called with every rendering, by several threads, for those who want to look at them.
   std::function<void(const View& view, const RenderResult& filled)> on_rendered;
 };
 

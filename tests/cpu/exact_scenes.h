@@ -1,6 +1,7 @@
 // tests/cpu/exact_scenes.h -- the reference renderer on scenes whose depth and poses are exact.
 #pragma once
 #include <cstdio>
+#include <mutex>
 #include <string>
 
 #include "datasets/layout.h"
@@ -49,7 +50,9 @@ inline ExactSceneFigures MeasureExactScene(const std::string& name, int views, i
   ExactSceneFigures figures;
   int count = 0;
   eval::EvaluateOptions options;
+  std::mutex mutex;
   options.on_rendered = [&](const View& held_out, const RenderResult& result) {
+    const std::lock_guard lock(mutex);
     eval::TrueView novel;
     std::vector<eval::TrueView> sources;
     for (size_t i = 0; i < poses.size(); ++i) {
