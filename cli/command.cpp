@@ -11,7 +11,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/trace.h"
-#include "pipeline/depth_settings.h"
+#include "pipeline/core/depth_settings.h"
 
 namespace dtr::cli {
 namespace {

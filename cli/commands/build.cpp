@@ -5,8 +5,8 @@
 #include "cli/build_arguments.h"
 #include "cli/command.h"
 #include "cli/not_registered.h"
-#include "pipeline/build.h"
-#include "pipeline/build_dynamic.h"
+#include "pipeline/build/build.h"
+#include "pipeline/dynamic/build_dynamic.h"
 
 namespace dtr::cli {
 namespace {

@@ -13,9 +13,9 @@
 #include "cli/sfm_options.h"
 #include "dtr/base/error.h"
 #include "dtr/base/work_folder.h"
-#include "pipeline/calibrate.h"
-#include "pipeline/camera_file.h"
-#include "pipeline/model_grid.h"
+#include "pipeline/core/calibrate.h"
+#include "pipeline/core/camera_file.h"
+#include "pipeline/core/model_grid.h"
 
 namespace dtr::cli {
 namespace {

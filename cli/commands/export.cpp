@@ -1,4 +1,4 @@
-#include "pipeline/export.h"
+#include "pipeline/export/export.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -14,7 +14,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/lower_case.h"
-#include "pipeline/export_web.h"
+#include "pipeline/export/export_web.h"
 
 namespace dtr::cli {
 namespace {

@@ -12,7 +12,7 @@
 #include "dtr/base/files.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/time_steps.h"
-#include "pipeline/validate.h"
+#include "pipeline/validate/validate.h"
 
 namespace dtr::cli {
 namespace {
