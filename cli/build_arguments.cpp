@@ -9,7 +9,7 @@
 #include "cli/sfm_options.h"
 #include "cli/video_options.h"
 #include "dtr/base/error.h"
-#include "pipeline/import/import.h"
+#include "pipeline/core/camera_file.h"
 
 namespace dtr::cli {
 namespace {

@@ -20,7 +20,7 @@ namespace dtr::pipeline {
 
 /// How cameras are found.
 struct CalibrateOptions {
-  /// Empty: SfM; else cameras of a format that CameraFormats() names (pipeline/import/import.h).
+  /// Empty: SfM; else cameras of a format that CameraFormats() names (camera_file.h).
   std::filesystem::path poses;
   std::string poses_format = {};  ///< its name; empty: by the content
   std::vector<bool> held_out;     ///< per photo; empty: none

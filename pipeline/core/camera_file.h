@@ -1,7 +1,8 @@
-// pipeline/core/camera_file.h -- one known lens, whichever program wrote it.
+// pipeline/core/camera_file.h -- files of known cameras, whichever program wrote them.
 #pragma once
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "calib/lens_camera.h"
 
@@ -17,5 +18,8 @@ calib::LensCamera ReadLens(const std::filesystem::path& file);
 /// where the aspect ratio is another.
 calib::LensCamera LensFor(const calib::LensCamera& lens, int width_px, int height_px,
                           const std::string& whose);
+
+/// The formats of ImportRequest::cameras and BuildOptions::poses, in byte order.
+std::vector<std::string> CameraFormats();
 
 }  // namespace dtr::pipeline

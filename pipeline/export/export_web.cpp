@@ -19,7 +19,6 @@
 #include "pipeline/core/run/output_folder.h"
 #include "pipeline/evaluate/evaluate.h"
 #include "pipeline/export/web/web_view.h"
-#include "pipeline/prune/prune.h"
 #include "viewer/web/web_page.h"
 
 namespace dtr::pipeline {
@@ -247,15 +246,7 @@ Files FilesWithin(const WebPageRequest& request, const Source& source,
 /// The set without what may go for this loss.
 Source Pruned(const WebPageRequest& request, double loss_db, const fs::path& output,
               Progress& progress) {
-  PruneSetOptions prune;
-  prune.set = request.set;
-  prune.output = output;
-  prune.prune.max_loss_db = loss_db;
-  prune.prune.render = request.render;
-  prune.threads = request.threads;
-  prune.make_renderer = request.make_renderer;
-  prune.make_timed_renderer = request.make_timed_renderer;
-  PruneSet(prune, progress);
+  request.prune(loss_db, output);
   WebPageRequest of_pruned = request;
   of_pruned.set = output;
   return SourceOf(of_pruned, progress);
@@ -264,8 +255,7 @@ Source Pruned(const WebPageRequest& request, double loss_db, const fs::path& out
 Files SmallEnough(const WebPageRequest& request, const Source& source, const fs::path& work,
                   WebPageReport& report, Progress& progress) {
   const std::span<const WebCoding> codings(kCodings);
-  const bool can_prune =
-      request.make_renderer && request.make_timed_renderer && source.set.frames.size() == 1;
+  const bool can_prune = request.make_renderer && request.prune && source.set.frames.size() == 1;
   if (!request.max_mb || !can_prune) {
     return FilesWithin(request, source, codings, report, progress);
   }

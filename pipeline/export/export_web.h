@@ -4,13 +4,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 
 #include "dtr/base/progress.h"
 #include "dtr/eval/held_out.h"
-#include "dtr/eval/timed_renderer.h"
 #include "dtr/render/options.h"
 
 namespace dtr::pipeline {
@@ -30,9 +28,10 @@ struct WebPageRequest {
   /// For the figures of held-out photos that the page shows, as Evaluate draws them; not called
   /// where the set has none, or several time steps. Empty: no such figures.
   std::function<eval::RenderFunction()> make_renderer;
-  /// With make_renderer: for max_mb, what images do not need is left out (PruneSet) where coarser
-  /// coding alone would cost more; not of sets of several time steps.
-  std::function<std::unique_ptr<eval::TimedRenderer>()> make_timed_renderer;
+  /// With make_renderer: writes `output`, the set without what images lose at most this for
+  /// (PruneSet). For max_mb, where coarser coding alone would cost more; not of sets of several
+  /// time steps. Empty: nothing is left out.
+  std::function<void(double loss_db, const std::filesystem::path& output)> prune;
   RenderOptions render;
   int threads = 0;
 };

@@ -44,9 +44,6 @@ struct ImportReport {
   capture::FolderContents contents;  ///< of the folder of images
 };
 
-/// The formats of ImportRequest::cameras and BuildOptions::poses, in byte order.
-std::vector<std::string> CameraFormats();
-
 /// Writes a whole set. Distorted photos are undistorted; a set without depth maps gets the points
 /// of the cameras' file, or those that are triangulated from the photos. With `refine` the cameras
 /// are adjusted to these points where held-out observations gain; world and unit stay. Throws

@@ -20,13 +20,14 @@
 #include "dtr/render/stored_options.h"
 #include "dtr/render/stored_options_json.h"
 #include "pipeline/core/depth_settings.h"
-#include "pipeline/core/reports/metres_json.h"
 #include "pipeline/core/reports/set_page.h"
 #include "pipeline/core/run/finishing.h"
 #include "pipeline/core/run/run_log.h"
 #include "pipeline/core/set_rig.h"
 #include "pipeline/metres/detail/panorama_positions.h"
+#include "pipeline/metres/detail/placed_points.h"
 #include "pipeline/metres/detail/scale_board.h"
+#include "pipeline/metres/detail/scale_json.h"
 #include "pipeline/validate/validate.h"
 
 namespace dtr::pipeline {

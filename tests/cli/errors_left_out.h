@@ -39,7 +39,7 @@ inline constexpr LeftOut kLeftOut[] = {
     {"pipeline/render/novel_frames.cpp", "expected one of --like"},
     {"pipeline/core/depth_settings.cpp", "--preset: expected"},
     {"pipeline/boards/validate_calibration.cpp", "expected one view per camera and frame"},
-    {"pipeline/metres/detail/scale_points.cpp", "expected a view of the set"},
+    {"pipeline/metres/detail/placed_points.cpp", "expected a view of the set"},
     {"datasets/layout.cpp", "views: expected 2 or more"},
     {"datasets/render_truth.cpp", "supersampling: expected"},
     {"datasets/render_truth.cpp", "noise: expected"},

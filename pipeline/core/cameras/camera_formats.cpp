@@ -13,8 +13,8 @@
 #include "dtr/io/formats/foreign_readers.h"
 #include "dtr/io/formats/plausible_intrinsics.h"
 #include "dtr/io/formats/rgbd_capture.h"
+#include "pipeline/core/camera_file.h"
 #include "pipeline/core/photos/named_files.h"
-#include "pipeline/import/import.h"
 
 namespace dtr::pipeline {
 namespace {

@@ -12,7 +12,7 @@
 #include "dtr/io/formats/foreign_depth.h"
 #include "dtr/io/formats/rgbd_capture.h"
 #include "pipeline/core/cameras/camera_distortion.h"
-#include "pipeline/core/depth/import_depth.h"
+#include "pipeline/core/depth/camera_depth.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -103,8 +103,8 @@ MapsOfCapture TakeCapture(DepthPriorChoice& choice) {
   return maps;
 }
 
-ImportOptions OptionsOf(const DepthPriorChoice& choice, const io::ConfidenceMaps& confidence) {
-  ImportOptions options;
+CameraDepthOptions OptionsOf(const DepthPriorChoice& choice, const io::ConfidenceMaps& confidence) {
+  CameraDepthOptions options;
   options.depth_dir = choice.folder;
   options.confidence = confidence;
   options.depth_kind = choice.kind;
@@ -123,7 +123,7 @@ DepthPriors::DepthPriors(const DepthPriorChoice& choice, std::span<const View* c
   confidence_ = std::move(maps_of_capture.confidence);
   unpacked_ = std::move(maps_of_capture.unpacked);
   if (!maps_of_capture.confidence_line.empty()) Say(maps_of_capture.confidence_line, progress);
-  const ImportOptions options = OptionsOf(choice_, confidence_);
+  const CameraDepthOptions options = OptionsOf(choice_, confidence_);
   for (const View* view : views) {
     io::NamedCamera camera;
     camera.name = view->name;

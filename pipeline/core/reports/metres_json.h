@@ -3,7 +3,6 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "pipeline/core/metres.h"
-#include "pipeline/metres/scale.h"
 
 namespace dtr::pipeline {
 
@@ -14,11 +13,6 @@ nlohmann::ordered_json JsonOf(const MetreOptions& options);
 nlohmann::ordered_json JsonOf(const MetreReport& report);
 /// Back from that. Throws nlohmann's exception where a field is missing or of another type.
 MetreReport MetreReportFrom(const nlohmann::ordered_json& json);
-
-/// As a set's provenance has it in `scale`: metres_per_unit, relative_sigma, and ScaleMethodJson.
-nlohmann::ordered_json ScaleJson(const ScaleReport& report);
-/// `method` and its fields.
-nlohmann::ordered_json ScaleMethodJson(const ScaleReport& report);
 
 /// {latitude_deg, longitude_deg, altitude_m}: the origin of a world with axes east, north, up. It
 /// has an altitude.

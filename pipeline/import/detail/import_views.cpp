@@ -16,7 +16,7 @@
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/geometry.h"
-#include "pipeline/core/depth/import_depth.h"
+#include "pipeline/core/depth/camera_depth.h"
 #include "pipeline/core/depth_settings.h"
 #include "pipeline/core/reports/calibration_json.h"
 #include "pipeline/core/run/finishing.h"

@@ -10,38 +10,18 @@
 
 #include "dtr/base/progress.h"
 #include "dtr/io/formats/cameras_json.h"
-#include "dtr/io/formats/foreign_confidence.h"
 #include "dtr/io/image_io.h"
 #include "dtr/types/sparse_scene.h"
 #include "dtr/types/view.h"
 #include "pipeline/core/calibration_report.h"
+#include "pipeline/core/depth/camera_depth.h"
 
 namespace dtr::pipeline {
 
-/// The distortion of one camera's photos; dtr/io itself knows no camera models.
-class CameraDistortion {
- public:
-  virtual ~CameraDistortion() = default;
-  /// Undistorts an image onto the grid of io::NamedCamera::camera, of the same size; `mask` (may be
-  /// empty: all is usable) becomes 0 where the image has no source.
-  virtual void Undistort(ImageRgb8& image, Mask& mask) const = 0;
-  /// Where a pixel of the undistorted image lies in the photo; empty: nowhere.
-  virtual std::optional<Eigen::Vector2d> DistortedPixel(const Eigen::Vector2d& pixel) const = 0;
-  /// Direction of a pixel of the photo, in the camera's frame; empty: it has none.
-  virtual std::optional<Eigen::Vector3d> RayFromDistorted(const Eigen::Vector2d& pixel) const = 0;
-};
-
 /// Where the files of a io::CameraList lie and what their numbers mean.
-struct ImportOptions {
+struct ImportOptions : CameraDepthOptions {
   std::filesystem::path images_dir;
-  std::filesystem::path depth_dir;  ///< empty: views stay without depth, for `dtr stereo`
-  io::ConfidenceMaps confidence;    ///< of these depth maps
-  std::filesystem::path mask_dir;   ///< empty: a folder `masks` beside images_dir
-  /// What the depth numbers measure; empty: what the list says for each camera.
-  std::optional<DepthKind> depth_kind;
-  /// Scene units per number in a depth file. Empty: 1 for float files; whole numbers are
-  /// rejected, as they are never scene units by themselves.
-  std::optional<double> depth_unit;
+  std::filesystem::path mask_dir;  ///< empty: a folder `masks` beside images_dir
   /// io::CameraList::photo_grid of the list.
   PhotoGrid photo_grid = PhotoGrid::kUpright;
   /// Knows the models of cameras with distortion; needed where the list has such.
@@ -49,9 +29,6 @@ struct ImportOptions {
   std::set<std::string> held_out;  ///< names of the list: camera and image are kept, depth is not
   DepthCoding depth_coding = DepthCoding::kPng16InverseDepth;
   int threads = 0;  ///< 0: all cores; the set does not depend on it
-  /// Views in memory at a time take at most so many 1e9 bytes, and one that alone takes more is
-  /// rejected; 0: no bound.
-  double memory_gb = 0;
   /// What tests and adjustment of the cameras gave, for the set's provenance; decides nothing.
   CalibrationReport calibration = {};
   bool completion = false;  ///< of depth that comes with the views (CompleteDepth)

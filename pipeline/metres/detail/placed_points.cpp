@@ -1,4 +1,4 @@
-#include "pipeline/core/scale_points.h"
+#include "pipeline/metres/detail/placed_points.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "pipeline/core/depth/import_depth.h"
+#include "pipeline/core/depth/camera_depth.h"
 
 #include <fmt/format.h>
 
@@ -52,7 +52,7 @@ void RequireComputable(const fs::path& file, const DepthImage& depth) {
 // What the numbers of a depth map take at their peak: as they come, as floats, and as plane z.
 constexpr double kBytesPerDepthPixel = 24;
 
-std::uint64_t LimitOf(const ImportOptions& options) {
+std::uint64_t LimitOf(const CameraDepthOptions& options) {
   constexpr double kAlways = 4 << 20;
   if (options.memory_gb <= 0) return io::kImageLimitPx;
   const double most = options.memory_gb * kBytesPerGigabyte / kBytesPerDepthPixel;
@@ -62,7 +62,8 @@ std::uint64_t LimitOf(const ImportOptions& options) {
 
 }  // namespace
 
-std::vector<fs::path> DepthFilesOf(const io::NamedCamera& named, const ImportOptions& options) {
+std::vector<fs::path> DepthFilesOf(const io::NamedCamera& named,
+                                   const CameraDepthOptions& options) {
   std::vector<fs::path> found;
   if (!named.depth_file.empty()) {
     if (const fs::path file = options.depth_dir / named.depth_file; fs::exists(file)) {
@@ -83,7 +84,7 @@ std::vector<fs::path> DepthFilesOf(const io::NamedCamera& named, const ImportOpt
   return found;
 }
 
-fs::path DepthFileOf(const io::NamedCamera& named, const ImportOptions& options) {
+fs::path DepthFileOf(const io::NamedCamera& named, const CameraDepthOptions& options) {
   if (!named.depth_file.empty()) return options.depth_dir / named.depth_file;
   const std::vector<fs::path> found = DepthFilesOf(named, options);
   if (found.size() != 1) {
@@ -95,7 +96,7 @@ fs::path DepthFileOf(const io::NamedCamera& named, const ImportOptions& options)
   return found.front();
 }
 
-DepthImage ReadCameraDepth(const io::NamedCamera& named, const ImportOptions& options,
+DepthImage ReadCameraDepth(const io::NamedCamera& named, const CameraDepthOptions& options,
                            const CameraDistortion* distortion, std::string& resampled) {
   const fs::path file = DepthFileOf(named, options);
   if (!options.depth_unit && io::HoldsWholeNumbers(file)) {
