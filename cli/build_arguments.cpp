@@ -89,7 +89,7 @@ std::optional<pipeline::BuildPart> PartFrom(const BuildArguments& arguments) {
 
 void AddBuildOptions(CLI::App& command, BuildArguments& arguments) {
   pipeline::BuildOptions* options = &arguments.options;
-  AddDynamicOptions(command, arguments);
+  if constexpr (DTR_WITH_DYNAMIC) AddDynamicOptions(command, arguments);
   command.add_option("PHOTOS", options->photos, "Folder of photos, a video, or a folder of videos")
       ->required();
   command.add_option("-o,--output", options->output, "The set to write, NAME.dtr")

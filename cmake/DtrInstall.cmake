@@ -28,6 +28,12 @@ install(FILES ${PROJECT_BINARY_DIR}/dtr.1.gz DESTINATION ${CMAKE_INSTALL_MANDIR}
 file(GLOB_RECURSE headers RELATIVE ${PROJECT_SOURCE_DIR}
   dtr/*.h capture/*.h calib/*.h stereo/*.h datasets/*.h viewer/*.h pipeline/*.h)
 list(FILTER headers EXCLUDE REGEX "/(shaders|examples|plaza)/|^pipeline/[a-z]+/[a-z]+/")
+foreach(feature IN LISTS DTR_FEATURES)
+  if(NOT DTR_WITH_${feature})
+    string(TOLOWER ${feature} folder)
+    list(FILTER headers EXCLUDE REGEX "^pipeline/${folder}/")
+  endif()
+endforeach()
 set(DTR_PUBLIC_HEADERS)
 foreach(header ${headers})
   file(STRINGS ${PROJECT_SOURCE_DIR}/${header} lines LIMIT_COUNT 2)

@@ -84,10 +84,10 @@ int RunCalibratePhotos(const CalibrateArguments& options, const Context& context
 void AddCalibrateCommand(CLI::App& app) {
   CLI::App* calibrate = app.add_subcommand("calibrate", "Find cameras");
   calibrate->require_subcommand(1);
-  AddCalibrateBoardCommand(*calibrate);
+  if constexpr (DTR_WITH_BOARDS) AddCalibrateBoardCommand(*calibrate);
   AddCalibrateRefineCommand(*calibrate);
-  AddCalibrateRigCommand(*calibrate);
-  AddCalibrateScaleCommand(*calibrate);
+  if constexpr (DTR_WITH_BOARDS) AddCalibrateRigCommand(*calibrate);
+  if constexpr (DTR_WITH_METRES) AddCalibrateScaleCommand(*calibrate);
   AddCommand(*calibrate, "photos", "Calibrate a folder of photos by structure from motion",
              "dtr calibrate photos photos/ -o calibration/", [](CLI::App& command) -> Action {
                auto options = std::make_shared<CalibrateArguments>();

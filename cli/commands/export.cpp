@@ -203,7 +203,7 @@ int RunExport(ExportOptions options, const Context& context) {
     if (options.evaluates_web) {
       options.web.render = StoredRenderOptions(io::ReadSet(options.web.set), WholeFrames());
       options.web.make_renderer = [&context] { return MakeRenderer({}, context.console); };
-      options.web.prune = PruneOf(options.web, context);
+      if constexpr (DTR_WITH_PRUNE) options.web.prune = PruneOf(options.web, context);
     }
     return RunWeb(options.web, context);
   }
