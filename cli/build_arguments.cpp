@@ -9,7 +9,7 @@
 #include "cli/sfm_options.h"
 #include "cli/video_options.h"
 #include "dtr/base/error.h"
-#include "pipeline/import.h"
+#include "pipeline/core/camera_file.h"
 
 namespace dtr::cli {
 namespace {
@@ -89,7 +89,7 @@ std::optional<pipeline::BuildPart> PartFrom(const BuildArguments& arguments) {
 
 void AddBuildOptions(CLI::App& command, BuildArguments& arguments) {
   pipeline::BuildOptions* options = &arguments.options;
-  AddDynamicOptions(command, arguments);
+  if constexpr (DTR_WITH_DYNAMIC) AddDynamicOptions(command, arguments);
   command.add_option("PHOTOS", options->photos, "Folder of photos, a video, or a folder of videos")
       ->required();
   command.add_option("-o,--output", options->output, "The set to write, NAME.dtr")

@@ -4,8 +4,8 @@
 
 #include "cli/command.h"
 #include "cli/metre_options.h"
-#include "pipeline/build.h"
-#include "pipeline/build_dynamic.h"
+#include "pipeline/build/build.h"
+#include "pipeline/dynamic/build_dynamic.h"
 
 namespace dtr::cli {
 

@@ -12,7 +12,7 @@
 #include "dtr/base/files.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/base/trace.h"
-#include "pipeline/depth_settings.h"
+#include "pipeline/core/depth_settings.h"
 
 namespace dtr::cli {
 namespace {

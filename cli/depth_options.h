@@ -3,7 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <vector>
 
-#include "pipeline/depth_settings.h"
+#include "pipeline/core/depth_settings.h"
 
 namespace dtr::cli {
 

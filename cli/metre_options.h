@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/metres.h"
-#include "pipeline/scale_points.h"
+#include "pipeline/core/metres.h"
+#include "pipeline/core/scale_points.h"
 
 namespace dtr::cli {
 

@@ -23,7 +23,7 @@ void RequireOutputFile(const std::filesystem::path& file, const std::string& opt
 /// - in the place of a file that is an input: named by another option, or in a folder that is;
 /// - in the place of any other file with content, unless `force`.
 /// Pipes, devices and what lies below /dev are written in place and pass. Folders pass as well: who
-/// writes several files into one checks each (pipeline/detail/run/output_folder.h).
+/// writes several files into one checks each (pipeline/core/run/output_folder.h).
 void RequireOutputs(const CLI::App& command, bool force);
 
 }  // namespace dtr::cli

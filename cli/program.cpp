@@ -30,11 +30,11 @@ int Run(int argc, char** argv) {
   app.set_version_flag("--version", DTR_VERSION);
   app.require_subcommand(1);
   AddCallableCommands(app);
-  AddBatchCommand(app);
+  if constexpr (DTR_WITH_BATCH) AddBatchCommand(app);
 #ifdef DTR_WITH_WINDOWS
   AddViewCommand(app);
 #endif
-  AddBenchCommand(app);
+  if constexpr (DTR_WITH_BENCH) AddBenchCommand(app);
   AddSelftestCommand(app);
   AddManualCommands(app, DTR_VERSION);
   LearnOptionNames(app);

@@ -48,11 +48,10 @@ Found CommandOf(CLI::App& app, const std::vector<std::string>& words) {
     if (next == below.end()) {
       std::vector<std::string> names;
       for (const CLI::App* one : below) names.push_back(one->get_name());
-      const std::string typed = found.words < words.size() ? words[found.words] : "";
-      throw UsageError(fmt::format(
-          "no command is called '{}'{}; there are {}",
-          fmt::join(words.begin(), words.begin() + std::min(found.words + 1, words.size()), " "),
-          typed.empty() ? "" : DidYouMean(typed, names), fmt::join(names, ", ")));
+      const auto last = words.begin() + std::min(found.words + 1, words.size());
+      throw UsageError(fmt::format("{}; there are {}",
+                                   NoCommandCalled({words.begin(), last}, names),
+                                   fmt::join(names, ", ")));
     }
     found.command = *next;
     ++found.words;
@@ -128,9 +127,9 @@ void AddCallableCommands(CLI::App& app) {
   AddInspectCommand(app);
   AddAdviseCommand(app);
   AddEvaluateCommand(app);
-  AddPruneCommand(app);
-  AddImportCommand(app);
-  AddExportCommand(app);
+  if constexpr (DTR_WITH_PRUNE) AddPruneCommand(app);
+  if constexpr (DTR_WITH_IMPORT) AddImportCommand(app);
+  if constexpr (DTR_WITH_EXPORT) AddExportCommand(app);
   AddJoinCommand(app);
   AddDatasetCommand(app);
 }

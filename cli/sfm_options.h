@@ -3,7 +3,7 @@
 #pragma once
 #include <CLI/CLI.hpp>
 
-#include "pipeline/sfm_settings.h"
+#include "pipeline/core/sfm_settings.h"
 
 namespace dtr::cli {
 

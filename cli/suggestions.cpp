@@ -6,9 +6,28 @@
 #include <algorithm>
 #include <array>
 #include <iterator>
+#include <string_view>
 
 namespace dtr::cli {
 namespace {
+
+// What needs a folder of pipeline/ that may be left out (cli/CMakeLists.txt).
+struct LeftOut {
+  std::string_view command, option;
+  bool is_built;
+};
+constexpr LeftOut kMayBeLeftOut[] = {
+    {"batch", "DTR_WITH_BATCH", DTR_WITH_BATCH},
+    {"bench", "DTR_WITH_BENCH", DTR_WITH_BENCH},
+    {"build --dynamic", "DTR_WITH_DYNAMIC", DTR_WITH_DYNAMIC},
+    {"calibrate board", "DTR_WITH_BOARDS", DTR_WITH_BOARDS},
+    {"calibrate rig", "DTR_WITH_BOARDS", DTR_WITH_BOARDS},
+    {"calibrate scale", "DTR_WITH_METRES", DTR_WITH_METRES},
+    {"export", "DTR_WITH_EXPORT", DTR_WITH_EXPORT},
+    {"import", "DTR_WITH_IMPORT", DTR_WITH_IMPORT},
+    {"prune", "DTR_WITH_PRUNE", DTR_WITH_PRUNE},
+    {"validate CALIB", "DTR_WITH_BOARDS", DTR_WITH_BOARDS},
+};
 
 // Up to so many letters of a word may be wrong, more of a longer one.
 size_t Tolerance(const std::string& typed) { return typed.size() < 4 ? 1 : 1 + typed.size() / 5; }
@@ -85,6 +104,22 @@ std::string DidYouMean(const std::string& typed, const std::vector<std::string>&
   return meant.empty() ? "" : fmt::format(" (did you mean '{}'?)", meant);
 }
 
+std::string BuiltWithout(const std::string& command) {
+  for (const LeftOut& one : kMayBeLeftOut) {
+    if (one.is_built || one.command != command) continue;
+    return fmt::format("this program was built without '{}' ({}=OFF)", command, one.option);
+  }
+  return "";
+}
+
+std::string NoCommandCalled(const std::vector<std::string>& words,
+                            const std::vector<std::string>& candidates) {
+  const std::string called = fmt::format("{}", fmt::join(words, " "));
+  if (const std::string line = BuiltWithout(called); !line.empty()) return line;
+  return fmt::format("no command is called '{}'{}", called,
+                     words.empty() ? "" : DidYouMean(words.back(), candidates));
+}
+
 std::vector<std::string> CommandNames(const CLI::App& app) {
   std::vector<std::string> names;
   for (const CLI::App* command : app.get_subcommands({})) {
@@ -109,19 +144,21 @@ std::string UnknownCommand(const CLI::App& app, const std::vector<std::string>& 
       words[count].starts_with('-')) {
     return "";
   }
-  const std::string called = fmt::format(
-      "{}", fmt::join(words.begin(), words.begin() + static_cast<long>(count) + 1, " "));
-  return fmt::format("no command is called '{}'{}", called, DidYouMean(words[count], names));
+  return NoCommandCalled({words.begin(), words.begin() + static_cast<long>(count) + 1}, names);
 }
 
 std::string MeantOption(const CLI::App& app, const std::vector<std::string>& words) {
   std::vector<std::string> names;
-  AddOptionNames(*Called(app, words).first, names);
+  const CLI::App& command = *Called(app, words).first;
+  AddOptionNames(command, names);
   for (const std::string& word : words) {
     if (word == "--") break;
     const std::string name = word.substr(0, word.find('='));
     if (!name.starts_with("--") || std::find(names.begin(), names.end(), name) != names.end()) {
       continue;
+    }
+    if (const std::string line = BuiltWithout(command.get_name() + " " + name); !line.empty()) {
+      return fmt::format(" ({})", line);
     }
     const std::string meant = Nearest(name, names);
     return meant.empty() ? "" : fmt::format(" ({}: did you mean {}?)", name, meant);

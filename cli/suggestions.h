@@ -20,12 +20,21 @@ std::vector<std::string> CommandNames(const CLI::App& app);
 /// `words`, those behind the program's name, with "help COMMAND..." as "COMMAND... --help".
 std::vector<std::string> WithHelpAsOption(std::vector<std::string> words);
 
+/// The line of `words` that call no command of the `candidates`, the last word: the one that may be
+/// meant, or that the program was built without it.
+std::string NoCommandCalled(const std::vector<std::string>& words,
+                            const std::vector<std::string>& candidates);
+
+/// That the program was built without a command, or an option of it ("build --dynamic"); empty
+/// where it was not.
+std::string BuiltWithout(const std::string& command);
+
 /// The line for the first of these words that calls a command that does not exist, below one that
 /// has commands; empty where all exist.
 std::string UnknownCommand(const CLI::App& app, const std::vector<std::string>& words);
 
-/// " (--holdot: did you mean --holdout?)" for the first option among the words that the command that
-/// they call does not have; empty where it has all, or none is near.
+/// " (--holdot: did you mean --holdout?)" for the first option among the words that the command
+/// that they call does not have; empty where it has all, or none is near.
 std::string MeantOption(const CLI::App& app, const std::vector<std::string>& words);
 
 }  // namespace dtr::cli

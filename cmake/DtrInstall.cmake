@@ -23,10 +23,17 @@ add_custom_command(OUTPUT ${PROJECT_BINARY_DIR}/dtr.1.gz
   DEPENDS ${PROJECT_BINARY_DIR}/dtr.manual VERBATIM)
 install(FILES ${PROJECT_BINARY_DIR}/dtr.1.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT runtime)
 
-# DTR_PUBLIC_HEADERS, relative to the root: those of the libraries that do not call themselves internal in their first lines.
+# DTR_PUBLIC_HEADERS, relative to the root: those of the libraries that do not call themselves internal in their first lines;
+# of a folder of pipeline/ those that lie in it directly.
 file(GLOB_RECURSE headers RELATIVE ${PROJECT_SOURCE_DIR}
   dtr/*.h capture/*.h calib/*.h stereo/*.h datasets/*.h viewer/*.h pipeline/*.h)
-list(FILTER headers EXCLUDE REGEX "/(shaders|detail|examples|plaza)/")
+list(FILTER headers EXCLUDE REGEX "/(shaders|examples|plaza)/|^pipeline/[a-z]+/[a-z]+/")
+foreach(feature IN LISTS DTR_FEATURES)
+  if(NOT DTR_WITH_${feature})
+    string(TOLOWER ${feature} folder)
+    list(FILTER headers EXCLUDE REGEX "^pipeline/${folder}/")
+  endif()
+endforeach()
 set(DTR_PUBLIC_HEADERS)
 foreach(header ${headers})
   file(STRINGS ${PROJECT_SOURCE_DIR}/${header} lines LIMIT_COUNT 2)

@@ -1,5 +1,5 @@
 // photos_to_set PHOTOS SET.dtr -- calibrates the photos, computes depth, writes a D+TR set.
-#include <pipeline/build.h>
+#include <pipeline/build/build.h>
 
 #include <iostream>
 

@@ -1,7 +1,7 @@
 // render_path SET.dtr FOLDER -- renders a path along the set's own cameras to FOLDER/000000.png,
 // ...
 #include <dtr/cpu/renderer.h>
-#include <pipeline/render.h>
+#include <pipeline/render/render.h>
 
 #include <iostream>
 

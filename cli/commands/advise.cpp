@@ -11,8 +11,8 @@
 #include "dtr/base/files.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/time_steps.h"
-#include "pipeline/advise.h"
-#include "pipeline/depth_settings.h"
+#include "pipeline/build/advise.h"
+#include "pipeline/core/depth_settings.h"
 #include "viewer/advice_page.h"
 
 namespace dtr::cli {

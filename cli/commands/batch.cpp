@@ -6,7 +6,7 @@
 #include "cli/command.h"
 #include "dtr/base/error.h"
 #include "dtr/base/process.h"
-#include "pipeline/batch.h"
+#include "pipeline/batch/batch.h"
 
 namespace dtr::cli {
 namespace {

@@ -13,8 +13,8 @@
 #include "dtr/eval/bench_json.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/time_steps.h"
-#include "pipeline/novel_frames.h"
-#include "pipeline/view_names.h"
+#include "pipeline/core/view_names.h"
+#include "pipeline/render/novel_frames.h"
 #ifdef DTR_HAS_OSG
 #include "cli/osg_bench.h"
 #endif

@@ -20,10 +20,10 @@
 #include "dtr/base/temporary_folder.h"
 #include "dtr/eval/render_sweep.h"
 #include "dtr/io/set_io.h"
-#include "pipeline/detail/photos/input_hash.h"
-#include "pipeline/detail/sweeps/calibration_sweep.h"
-#include "pipeline/detail/sweeps/stereo_sweep.h"
-#include "pipeline/detail/sweeps/storage_sweep.h"
+#include "pipeline/bench/calibration_sweep.h"
+#include "pipeline/bench/stereo_sweep.h"
+#include "pipeline/bench/storage_sweep.h"
+#include "pipeline/core/photos/input_hash.h"
 
 namespace dtr::cli {
 namespace {

@@ -5,11 +5,20 @@
 #include "cli/build_arguments.h"
 #include "cli/command.h"
 #include "cli/not_registered.h"
-#include "pipeline/build.h"
-#include "pipeline/build_dynamic.h"
+#include "pipeline/build/build.h"
+#include "pipeline/dynamic/build_dynamic.h"
 
 namespace dtr::cli {
 namespace {
+
+pipeline::BuildReport Build(const BuildArguments& arguments, Progress& progress) {
+  if constexpr (DTR_WITH_DYNAMIC) {
+    if (arguments.is_dynamic) {
+      return pipeline::BuildDynamicSet(arguments.options, arguments.dynamic, progress);
+    }
+  }
+  return pipeline::BuildSet(arguments.options, progress);
+}
 
 void SayResult(const pipeline::BuildOptions& options, const pipeline::BuildReport& report,
                Console& console) {
@@ -52,10 +61,7 @@ void AddBuildCommand(CLI::App& app) {
                  context.console.KeepsWork();
                  FinishBuildArguments(context.common, *arguments);
                  const pipeline::BuildOptions& options = arguments->options;
-                 const auto report =
-                     arguments->is_dynamic
-                         ? pipeline::BuildDynamicSet(options, arguments->dynamic, context.console)
-                         : pipeline::BuildSet(options, context.console);
+                 const auto report = Build(*arguments, context.console);
                  SayResult(options, report, context.console);
                  if (!report.part) context.EmitJson(pipeline::ToJson(report));
                  return kDone;

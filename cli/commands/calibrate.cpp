@@ -13,9 +13,9 @@
 #include "cli/sfm_options.h"
 #include "dtr/base/error.h"
 #include "dtr/base/work_folder.h"
-#include "pipeline/calibrate.h"
-#include "pipeline/camera_file.h"
-#include "pipeline/model_grid.h"
+#include "pipeline/core/calibrate.h"
+#include "pipeline/core/camera_file.h"
+#include "pipeline/core/model_grid.h"
 
 namespace dtr::cli {
 namespace {
@@ -82,10 +82,10 @@ int RunCalibratePhotos(const CalibrateArguments& options, const Context& context
 void AddCalibrateCommand(CLI::App& app) {
   CLI::App* calibrate = app.add_subcommand("calibrate", "Find cameras");
   calibrate->require_subcommand(1);
-  AddCalibrateBoardCommand(*calibrate);
+  if constexpr (DTR_WITH_BOARDS) AddCalibrateBoardCommand(*calibrate);
   AddCalibrateRefineCommand(*calibrate);
-  AddCalibrateRigCommand(*calibrate);
-  AddCalibrateScaleCommand(*calibrate);
+  if constexpr (DTR_WITH_BOARDS) AddCalibrateRigCommand(*calibrate);
+  if constexpr (DTR_WITH_METRES) AddCalibrateScaleCommand(*calibrate);
   AddCommand(*calibrate, "photos", "Calibrate a folder of photos by structure from motion",
              "dtr calibrate photos photos/ -o calibration/", [](CLI::App& command) -> Action {
                auto options = std::make_shared<CalibrateArguments>();

@@ -13,7 +13,7 @@
 #include "cli/output_file.h"
 #include "dtr/base/error.h"
 #include "dtr/base/order_statistics.h"
-#include "pipeline/calibrate_board.h"
+#include "pipeline/boards/calibrate_board.h"
 
 namespace dtr::cli {
 namespace {

@@ -8,9 +8,9 @@
 #include "cli/command.h"
 #include "cli/metre_options.h"
 #include "dtr/base/error.h"
-#include "pipeline/camera_file.h"
-#include "pipeline/metres.h"
-#include "pipeline/model_grid.h"
+#include "pipeline/core/camera_file.h"
+#include "pipeline/core/metres.h"
+#include "pipeline/core/model_grid.h"
 
 namespace dtr::cli {
 namespace {

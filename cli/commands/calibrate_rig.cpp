@@ -12,8 +12,8 @@
 #include "cli/commands/validate_calibration.h"
 #include "cli/output_file.h"
 #include "dtr/base/error.h"
-#include "pipeline/calibrate_rig.h"
-#include "pipeline/camera_file.h"
+#include "pipeline/boards/calibrate_rig.h"
+#include "pipeline/core/camera_file.h"
 
 namespace dtr::cli {
 namespace {

@@ -7,8 +7,8 @@
 #include "dtr/base/error.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/time_steps.h"
-#include "pipeline/scale.h"
-#include "pipeline/view_names.h"
+#include "pipeline/core/view_names.h"
+#include "pipeline/metres/scale.h"
 
 namespace dtr::cli {
 namespace {

@@ -11,7 +11,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/image_io.h"
-#include "pipeline/capture.h"
+#include "pipeline/build/capture.h"
 
 namespace dtr::cli {
 namespace {

@@ -1,4 +1,4 @@
-#include "pipeline/evaluate.h"
+#include "pipeline/evaluate/evaluate.h"
 
 #include <fmt/format.h>
 

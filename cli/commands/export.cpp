@@ -1,4 +1,4 @@
-#include "pipeline/export.h"
+#include "pipeline/export/export.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -14,7 +14,8 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/lower_case.h"
-#include "pipeline/export_web.h"
+#include "pipeline/export/export_web.h"
+#include "pipeline/prune/prune.h"
 
 namespace dtr::cli {
 namespace {
@@ -175,6 +176,22 @@ int RunWeb(pipeline::WebPageRequest request, const Context& context) {
   return kDone;
 }
 
+// For pages that are too large.
+std::function<void(double loss_db, const std::filesystem::path& output)> PruneOf(
+    const pipeline::WebPageRequest& web, const Context& context) {
+  return [&web, &context](double loss_db, const std::filesystem::path& output) {
+    pipeline::PruneSetOptions prune;
+    prune.set = web.set;
+    prune.output = output;
+    prune.prune.max_loss_db = loss_db;
+    prune.prune.render = web.render;
+    prune.threads = web.threads;
+    prune.make_renderer = web.make_renderer;
+    prune.make_timed_renderer = [&context] { return MakeTimedRenderer({}, context.console); };
+    PruneSet(prune, context.console);
+  };
+}
+
 int RunExport(ExportOptions options, const Context& context) {
   if (options.format.empty()) options.format = FormatFor(options.request.output);
   RequireOptionsOfFormat(options);
@@ -184,9 +201,7 @@ int RunExport(ExportOptions options, const Context& context) {
     if (options.evaluates_web) {
       options.web.render = StoredRenderOptions(io::ReadSet(options.web.set), WholeFrames());
       options.web.make_renderer = [&context] { return MakeRenderer({}, context.console); };
-      options.web.make_timed_renderer = [&context] {
-        return MakeTimedRenderer({}, context.console);
-      };
+      if constexpr (DTR_WITH_PRUNE) options.web.prune = PruneOf(options.web, context);
     }
     return RunWeb(options.web, context);
   }

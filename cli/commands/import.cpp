@@ -1,4 +1,4 @@
-#include "pipeline/import.h"
+#include "pipeline/import/import.h"
 
 #include <fmt/format.h>
 

@@ -16,8 +16,8 @@
 #include "dtr/io/run_record.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/time_steps.h"
-#include "pipeline/set_stream.h"
-#include "pipeline/validate.h"
+#include "pipeline/core/set_stream.h"
+#include "pipeline/validate/validate.h"
 #include "viewer/inspect_page.h"
 
 namespace dtr::cli {

@@ -5,7 +5,7 @@
 
 #include "cli/command.h"
 #include "cli/number_checks.h"
-#include "pipeline/join.h"
+#include "pipeline/build/join.h"
 
 namespace dtr::cli {
 

@@ -9,7 +9,7 @@
 #include "cli/render_options.h"
 #include "cli/renderers.h"
 #include "dtr/io/set_io.h"
-#include "pipeline/prune.h"
+#include "pipeline/prune/prune.h"
 
 namespace dtr::cli {
 namespace {

@@ -1,4 +1,4 @@
-#include "pipeline/render.h"
+#include "pipeline/render/render.h"
 
 #include <fmt/format.h>
 

@@ -4,7 +4,7 @@
 
 #include "cli/command.h"
 #include "cli/depth_options.h"
-#include "pipeline/stereo.h"
+#include "pipeline/build/stereo.h"
 
 namespace dtr::cli {
 

@@ -8,11 +8,12 @@
 #include "cli/commands/validate_calibration.h"
 #include "cli/number_checks.h"
 #include "cli/output_file.h"
+#include "cli/suggestions.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/time_steps.h"
-#include "pipeline/validate.h"
+#include "pipeline/validate/validate.h"
 
 namespace dtr::cli {
 namespace {
@@ -56,13 +57,48 @@ void RejectForSets(const ValidateCalibrationOptions& options) {
   }
 }
 
+// What concerns calibration files alone.
+void AddCalibrationOptions(CLI::App& command, ValidateCalibrationOptions& calibration) {
+  command
+      .add_option("--images", calibration.images,
+                  "Photos of the board that the calibration has not seen; without them it is "
+                  "validated on those it was made from")
+      ->type_name("DIR");
+  command
+      .add_option("--pattern", calibration.pattern,
+                  "Only photos of these names, as 'left*.jpg' [*]")
+      ->type_name("PATTERN");
+  command
+      .add_option("--board", calibration.board,
+                  "The board of the photos, as calibrate board has it; for cameras from "
+                  "elsewhere")
+      ->type_name("BOARD");
+  command
+      .add_option("--max-uncertainty", calibration.max_uncertainty_px,
+                  fmt::format("Limit of the projections' standard deviation at the boards' "
+                              "distance [{}]",
+                              calib::BoardLimits{}.max_uncertainty_px))
+      ->check(kPositive)
+      ->type_name("PX");
+  command
+      .add_option("--at", calibration.at,
+                  "Of a calibration file: also report the projections' standard deviation at "
+                  "these distances from the camera, as 2m or 60cm, or in the unit of the "
+                  "board's squares")
+      ->delimiter(',')
+      ->type_name("D,...");
+}
+
 int RunValidate(ValidateArguments options, const Context& context) {
   if (std::filesystem::is_regular_file(options.set)) {
     if (options.max_cross_px) {
       throw UsageError("--max-cross: is for sets, not for calibration files");
     }
+    if (const std::string line = BuiltWithout("validate CALIB"); !line.empty()) {
+      throw UsageError(line);
+    }
     options.calibration.file = options.set;
-    return RunValidateCalibration(options.calibration, context);
+    if constexpr (DTR_WITH_BOARDS) return RunValidateCalibration(options.calibration, context);
   }
   RejectForSets(options.calibration);
   double& max_rms_px = options.limits.reprojection.max_rms_px;
@@ -118,34 +154,7 @@ void AddValidateCommand(CLI::App& app) {
                             options->limits.max_cross_px))
             ->check(kPositive)
             ->type_name("PX");
-        command
-            .add_option("--images", calibration.images,
-                        "Photos of the board that the calibration has not seen; without them it is "
-                        "validated on those it was made from")
-            ->type_name("DIR");
-        command
-            .add_option("--pattern", calibration.pattern,
-                        "Only photos of these names, as 'left*.jpg' [*]")
-            ->type_name("PATTERN");
-        command
-            .add_option("--board", calibration.board,
-                        "The board of the photos, as calibrate board has it; for cameras from "
-                        "elsewhere")
-            ->type_name("BOARD");
-        command
-            .add_option("--max-uncertainty", calibration.max_uncertainty_px,
-                        fmt::format("Limit of the projections' standard deviation at the boards' "
-                                    "distance [{}]",
-                                    calib::BoardLimits{}.max_uncertainty_px))
-            ->check(kPositive)
-            ->type_name("PX");
-        command
-            .add_option("--at", calibration.at,
-                        "Of a calibration file: also report the projections' standard deviation at "
-                        "these distances from the camera, as 2m or 60cm, or in the unit of the "
-                        "board's squares")
-            ->delimiter(',')
-            ->type_name("D,...");
+        if constexpr (DTR_WITH_BOARDS) AddCalibrationOptions(command, calibration);
         command
             .add_option("--report", calibration.report,
                         "The report as a page: residuals, coverage, uncertainty, worst views")

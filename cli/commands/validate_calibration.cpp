@@ -11,7 +11,7 @@
 #include "cli/output_file.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
-#include "pipeline/validate_calibration.h"
+#include "pipeline/boards/validate_calibration.h"
 
 namespace dtr::cli {
 namespace {

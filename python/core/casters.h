@@ -2,7 +2,7 @@
 #pragma once
 #include <pybind11/pybind11.h>
 
-#include "pipeline/novel_frames.h"
+#include "pipeline/render/novel_frames.h"
 
 namespace dtr::python {
 

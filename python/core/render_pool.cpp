@@ -16,8 +16,8 @@
 #include "dtr/render/scene.h"
 #include "dtr/render/time_steps.h"
 #include "dtr/render/view_stream.h"
-#include "pipeline/set_stream.h"
-#include "pipeline/view_names.h"
+#include "pipeline/core/set_stream.h"
+#include "pipeline/core/view_names.h"
 
 namespace dtr::python {
 namespace {

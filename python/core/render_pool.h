@@ -13,7 +13,7 @@
 #include "dtr/render/options.h"
 #include "dtr/render/result.h"
 #include "dtr/types/dtr_set.h"
-#include "pipeline/novel_frames.h"
+#include "pipeline/render/novel_frames.h"
 
 namespace dtr::python {
 

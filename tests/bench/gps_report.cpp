@@ -11,7 +11,7 @@
 #include "calib/bundle/metric_refine.h"
 #include "calib/colmap/model_io.h"
 #include "calib/similarity.h"
-#include "pipeline/photo_positions.h"
+#include "pipeline/core/photo_positions.h"
 
 namespace {
 

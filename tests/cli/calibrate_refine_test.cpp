@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "calib/colmap/model_io.h"
-#include "pipeline/metres.h"
+#include "pipeline/core/metres.h"
 #include "tests/calib/bundle/synthetic_bundle.h"
 #include "tests/cli/gps_photo.h"
 #include "tests/cli/run_dtr.h"

@@ -8,7 +8,7 @@
 #include "calib/colmap/model_io.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
-#include "pipeline/detail/depth/depth_precision.h"
+#include "pipeline/core/depth/depth_precision.h"
 #include "tests/calib/colmap/fake_colmap.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/cli/small_courtyard.h"

@@ -6,6 +6,8 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cstdlib>
+#include <iostream>
 #include <optional>
 #include <sstream>
 #include <thread>
@@ -13,6 +15,7 @@
 #include "dtr/base/files.h"
 #include "tests/cli/program_server.h"
 #include "tests/support/test_data.h"
+#include "tests/support/test_main.h"
 
 namespace dtr::testing {
 namespace {
@@ -59,6 +62,12 @@ Ran RanWith(int status, const TemporaryFolder& folder) {
   if (WIFEXITED(status)) ran.code = WEXITSTATUS(status);
   ran.out = Text(folder / "out");
   ran.err = Text(folder / "err");
+  // Tests of what this program was built without are skipped, with all of their suite that follow.
+  if (ran.err.find("this program was built without '") != std::string::npos &&
+      !::testing::UnitTest::GetInstance()->Failed()) {
+    std::cout << "SKIPPED: " << ran.err << std::flush;
+    std::exit(kSkippedExitCode);
+  }
   return ran;
 }
 

@@ -4,7 +4,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/detail/boards/rig_names.h"
+#include "pipeline/core/photos/rig_names.h"
 #include "tests/cli/chessboard_set.h"
 
 namespace dtr::testing {
@@ -21,8 +21,8 @@ class ValidateCalibration : public ChessboardSet {
   // The left camera by its first nine photos; 10 to 14 are unseen.
   void Calibrate() {
     DtrCalibrated({"calibrate", "board", Photos().string(), "--images", "left0*.jpg", "--board",
-           kChessboard, "--model", "brown4", "-o", In("left.json"), "-o", In("left.yml"), "-o",
-           In("left.txt")});
+                   kChessboard, "--model", "brown4", "-o", In("left.json"), "-o", In("left.yml"),
+                   "-o", In("left.txt")});
   }
   Ran Validate(const std::string& file, std::vector<std::string> further) {
     further.insert(further.begin(), {"validate", In(file)});

@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "pipeline/detail/pages/residual_plots.h"
+#include "pipeline/core/reports/residual_plots.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/cli/small_courtyard.h"
 #include "tests/support/test_data.h"

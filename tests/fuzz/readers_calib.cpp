@@ -9,7 +9,7 @@
 #include "capture/photo.h"
 #include "datasets/make.h"
 #include "dtr/base/files.h"
-#include "pipeline/detail/depth/grid_files.h"
+#include "pipeline/core/depth/grid_files.h"
 #include "tests/calib/solve/synthetic_views.h"
 #include "tests/fuzz/readers.h"
 

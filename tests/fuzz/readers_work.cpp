@@ -6,10 +6,10 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/run_record.h"
-#include "pipeline/depth_settings.h"
-#include "pipeline/detail/boards/rig_timestamps.h"
-#include "pipeline/detail/depth/quality_json.h"
-#include "pipeline/detail/run/prune_journal.h"
+#include "pipeline/core/depth/quality_json.h"
+#include "pipeline/core/depth_settings.h"
+#include "pipeline/core/photos/rig_timestamps.h"
+#include "pipeline/prune/detail/prune_journal.h"
 #include "tests/fuzz/readers.h"
 
 namespace dtr::fuzz {

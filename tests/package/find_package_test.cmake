@@ -19,7 +19,7 @@ foreach(file bin/dtr share/man/man1/dtr.1.gz share/bash-completion/completions/d
 endforeach()
 
 # Headers that call themselves internal stay at home, and no public one includes such a header.
-file(GLOB_RECURSE internal ${prefix}/include/*/pipeline/detail/*)
+file(GLOB_RECURSE internal ${prefix}/include/*/pipeline/*/*/*)
 if(internal)
   message(FATAL_ERROR "expected no internal header to be installed, found ${internal}")
 endif()

@@ -6,7 +6,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/quiet_progress.h"
-#include "pipeline/batch.h"
+#include "pipeline/batch/batch.h"
 #include "tests/support/message_of.h"
 #include "tests/support/noted_lines.h"
 #include "tests/support/test_data.h"

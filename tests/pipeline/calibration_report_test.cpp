@@ -5,8 +5,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/detail/reports/calibration_json.h"
-#include "pipeline/detail/reports/metres_json.h"
+#include "pipeline/core/reports/calibration_json.h"
+#include "pipeline/core/reports/metres_json.h"
 
 namespace dtr::pipeline {
 namespace {

@@ -1,6 +1,6 @@
 // Cameras of other programs: each format recognised by its content, and every point where the
 // program that wrote the file puts it.
-#include "pipeline/detail/cameras/camera_formats.h"
+#include "pipeline/core/cameras/camera_formats.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -18,10 +18,10 @@
 #include "dtr/base/files.h"
 #include "dtr/base/temporary_folder.h"
 #include "dtr/io/image_io.h"
-#include "pipeline/detail/cameras/foreign_cameras.h"
-#include "pipeline/detail/import/camera_distortion.h"
-#include "pipeline/detail/import/camera_files.h"
-#include "pipeline/import.h"
+#include "pipeline/core/cameras/camera_distortion.h"
+#include "pipeline/core/cameras/foreign_cameras.h"
+#include "pipeline/import/detail/camera_files.h"
+#include "pipeline/import/import.h"
 #include "tests/pipeline/source_programs.h"
 #include "tests/support/message_of.h"
 #include "tests/support/truncation.h"

@@ -1,6 +1,6 @@
-#include "pipeline/detail/photos/camera_groups.h"
+#include "pipeline/core/photos/camera_groups.h"
 
-#include "pipeline/detail/photos/exif_focal.h"
+#include "pipeline/core/cameras/exif_focal.h"
 
 #include <gtest/gtest.h>
 

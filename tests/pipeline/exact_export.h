@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/export.h"
+#include "pipeline/export/export.h"
 #include "tests/pipeline/exact_set.h"
 #include "tests/support/noted_lines.h"
 #include "tests/support/test_data.h"

@@ -8,7 +8,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/process.h"
 #include "dtr/base/random.h"
-#include "pipeline/export.h"
+#include "pipeline/export/export.h"
 #include "tests/pipeline/exact_export.h"
 #include "tests/pipeline/off_centre.h"
 #include "tests/pipeline/read_ply.h"

@@ -15,8 +15,8 @@
 #include "dtr/io/formats/npy.h"
 #include "dtr/io/formats/pfm.h"
 #include "dtr/io/image_io.h"
-#include "pipeline/detail/export/depth_file.h"
-#include "pipeline/export.h"
+#include "pipeline/export/detail/depth_file.h"
+#include "pipeline/export/export.h"
 #include "tests/pipeline/exact_export.h"
 #include "tests/pipeline/read_ply.h"
 

@@ -11,7 +11,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
-#include "pipeline/export.h"
+#include "pipeline/export/export.h"
 #include "tests/pipeline/exact_export.h"
 #include "tests/pipeline/read_ply.h"
 #include "tests/support/on_threads.h"

@@ -14,9 +14,9 @@
 #include "dtr/base/files.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
-#include "pipeline/detail/cameras/camera_formats.h"
-#include "pipeline/detail/cameras/foreign_cameras.h"
-#include "pipeline/export.h"
+#include "pipeline/core/cameras/camera_formats.h"
+#include "pipeline/core/cameras/foreign_cameras.h"
+#include "pipeline/export/export.h"
 #include "tests/pipeline/exact_export.h"
 
 namespace dtr::testing {

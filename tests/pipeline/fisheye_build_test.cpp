@@ -10,7 +10,7 @@
 #include "calib/sparse_from_sfm.h"
 #include "capture/ingest.h"
 #include "dtr/io/formats/cameras_json.h"
-#include "pipeline/calibrate.h"
+#include "pipeline/core/calibrate.h"
 #include "tests/pipeline/dataset_once.h"
 
 namespace dtr::pipeline {

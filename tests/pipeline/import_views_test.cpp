@@ -1,4 +1,4 @@
-#include "pipeline/detail/import/import_views.h"
+#include "pipeline/import/detail/import_views.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

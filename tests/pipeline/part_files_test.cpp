@@ -1,4 +1,4 @@
-#include "pipeline/detail/run/part_files.h"
+#include "pipeline/build/detail/part_files.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Models whose photos were scaled since they were made.
-#include "pipeline/detail/cameras/photo_scale.h"
+#include "pipeline/core/cameras/photo_scale.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

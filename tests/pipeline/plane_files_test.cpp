@@ -1,4 +1,4 @@
-#include "pipeline/detail/depth/plane_files.h"
+#include "pipeline/core/depth/plane_files.h"
 
 #include <gtest/gtest.h>
 

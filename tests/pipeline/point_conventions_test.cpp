@@ -1,6 +1,6 @@
 // Files of other programs in the ways in which programs write them: which it is shows by their
 // points. Whatever the way, every point must be where the model that was written puts it.
-#include "pipeline/detail/cameras/point_conventions.h"
+#include "pipeline/core/cameras/point_conventions.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -14,8 +14,8 @@
 #include "dtr/base/random.h"
 #include "dtr/base/temporary_folder.h"
 #include "dtr/io/formats/foreign_readers.h"
-#include "pipeline/detail/cameras/foreign_cameras.h"
-#include "pipeline/detail/import/camera_distortion.h"
+#include "pipeline/core/cameras/camera_distortion.h"
+#include "pipeline/core/cameras/foreign_cameras.h"
 #include "tests/pipeline/source_programs.h"
 
 namespace dtr::pipeline {

@@ -11,7 +11,7 @@
 #include "calib/validation/boards.h"
 #include "calib/validation/free_running.h"
 #include "dtr/base/files.h"
-#include "pipeline/rig_photos.h"
+#include "pipeline/boards/rig_photos.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::calib {

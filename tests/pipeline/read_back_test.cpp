@@ -13,6 +13,7 @@
 
 #include "dtr/base/files.h"
 #include "dtr/base/process.h"
+#include "pipeline/export/export.h"
 #include "tests/pipeline/exact_export.h"
 #include "tests/pipeline/off_centre.h"
 #include "tests/pipeline/read_ply.h"

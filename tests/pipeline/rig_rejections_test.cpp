@@ -4,8 +4,8 @@
 
 #include "dtr/base/error.h"
 #include "dtr/io/image_io.h"
-#include "pipeline/calibrate_rig.h"
-#include "pipeline/validate_calibration.h"
+#include "pipeline/boards/calibrate_rig.h"
+#include "pipeline/boards/validate_calibration.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::pipeline {

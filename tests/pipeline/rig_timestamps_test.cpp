@@ -1,5 +1,5 @@
 // Tables of a rig's recording as programs write them.
-#include "pipeline/detail/boards/rig_timestamps.h"
+#include "pipeline/core/photos/rig_timestamps.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -4,7 +4,7 @@
 #include <map>
 #include <string>
 
-#include "pipeline/rig_photos.h"
+#include "pipeline/boards/rig_photos.h"
 #include "tests/capture/video/ffmpeg_videos.h"
 
 namespace dtr::pipeline {

@@ -1,4 +1,4 @@
-#include "pipeline/detail/run/side_by_side.h"
+#include "pipeline/core/run/side_by_side.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Which settings fit into a number of seconds, given what work costs.
-#include "pipeline/detail/depth/time_budget.h"
+#include "pipeline/core/depth/time_budget.h"
 
 #include <gtest/gtest.h>
 

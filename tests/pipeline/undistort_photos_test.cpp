@@ -1,5 +1,5 @@
 // Photos become views once: what an interrupted run wrote is neither read nor drawn again.
-#include "pipeline/detail/photos/undistort_photos.h"
+#include "pipeline/core/photos/undistort_photos.h"
 
 #include <gtest/gtest.h>
 

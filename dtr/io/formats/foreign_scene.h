@@ -64,7 +64,7 @@ struct ForeignScene {
   std::vector<ForeignCamera> cameras;
   std::vector<ForeignPoint> points;
   /// The program of this format where others write it in ways of their own: the points decide in
-  /// which (pipeline/detail/cameras/point_conventions.h). Empty: the format has one meaning.
+  /// which (pipeline/core/cameras/point_conventions.h). Empty: the format has one meaning.
   std::string conventions_of;
   /// Photos that have no camera, and why: disabled, not aligned, ...
   std::vector<std::pair<std::string, std::string>> left_out;

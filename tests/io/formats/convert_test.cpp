@@ -12,7 +12,7 @@
 #include "dtr/io/formats/foreign_depth.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
-#include "pipeline/detail/import/import_views.h"
+#include "pipeline/import/detail/import_views.h"
 #include "tests/io/formats/residuals.h"
 #include "tests/support/test_data.h"
 
