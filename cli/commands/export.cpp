@@ -185,7 +185,6 @@ std::function<void(double loss_db, const std::filesystem::path& output)> PruneOf
     prune.output = output;
     prune.prune.max_loss_db = loss_db;
     prune.prune.render = web.render;
-    prune.threads = web.threads;
     prune.make_renderer = web.make_renderer;
     prune.make_timed_renderer = [&context] { return MakeTimedRenderer({}, context.console); };
     PruneSet(prune, context.console);
