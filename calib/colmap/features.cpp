@@ -157,7 +157,7 @@ std::vector<double> FirstGuess(calib::CameraModel model, const SfmImageInput& im
   return params;
 }
 
-ExtractionPlan PlanExtraction(const std::vector<SfmImageInput>& images, double memory_gb, ,
+ExtractionPlan PlanExtraction(const std::vector<SfmImageInput>& images, double memory_gb,
                               int requested_side_px) {
   const double limit_mib = kFill * memory_gb * kBytesPerGigabyte / kMib;
   const LargestImage largest = LargestOf(images);

@@ -36,7 +36,7 @@ inline constexpr int kSmallestSidePx = 640;
 /// Chooses threads and size: the size first (`requested_side_px`, or kPreferredSidePx when 0), then
 /// as many threads as fit; when not even one fits, the largest size at which one does.
 /// Throws UsageError when memory_gb does not suffice for kSmallestSidePx.
-ExtractionPlan PlanExtraction(const std::vector<SfmImageInput>& images, double memory_gb, ,
+ExtractionPlan PlanExtraction(const std::vector<SfmImageInput>& images, double memory_gb,
                               int requested_side_px);
 
 /// Photos that share one camera of the database.

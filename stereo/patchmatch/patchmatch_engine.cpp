@@ -194,8 +194,7 @@ void TakeCheaper(const State& found, const Mask& lost, State* state) {
 /// What is matched with what, at all sizes.
 struct Problem {
   Problem(std::span<const StereoView> views, int reference, std::span<const int> neighbours,
-          const DepthRange& depth_range, std::span<const PlaneMap* const> maps, int max_sources,
-          const EngineOptions& options)
+          const DepthRange& depth_range, std::span<const PlaneMap* const> maps, int max_sources)
       : view(&views[static_cast<size_t>(reference)]), range(depth_range) {
     CheckRequest(views, reference, neighbours, range);
     const int levels = maps.empty() ? LevelsFor(views, reference, neighbours) : 1;
@@ -306,7 +305,7 @@ std::uint64_t PatchMatchEngine::WorkBytes(std::span<const StereoView> views, int
 DepthEstimate PatchMatchEngine::Estimate(std::span<const StereoView> views, int reference,
                                          std::span<const int> neighbours, const DepthRange& range,
                                          const EngineOptions& options) const {
-  Problem problem(views, reference, neighbours, range, {}, Neighbours(), options);
+  Problem problem(views, reference, neighbours, range, {}, Neighbours());
   State state =
       problem.Search(options.look ? kLookIterations : quality_.iterations, problem.Open(), options);
   return Assessed(problem, &state, &without_planes_);
@@ -315,7 +314,7 @@ DepthEstimate PatchMatchEngine::Estimate(std::span<const StereoView> views, int 
 PlaneMap PatchMatchEngine::Match(std::span<const StereoView> views, int reference,
                                  std::span<const int> neighbours, const DepthRange& range,
                                  const EngineOptions& options) const {
-  Problem problem(views, reference, neighbours, range, {}, quality_.neighbours, options);
+  Problem problem(views, reference, neighbours, range, {}, quality_.neighbours);
   const bool follows = problem.time_step && !problem.time_step->before.empty();
   const State state = follows ? problem.Follow(quality_.iterations, options)
                               : problem.Search(quality_.iterations, problem.Open(), options);
@@ -328,7 +327,7 @@ PlaneMap PatchMatchEngine::Refine(std::span<const StereoView> views, int referen
                                   std::span<const int> neighbours, const DepthRange& range,
                                   std::span<const PlaneMap* const> maps, int round,
                                   const EngineOptions& options) const {
-  Problem problem(views, reference, neighbours, range, maps, quality_.round_neighbours, options);
+  Problem problem(views, reference, neighbours, range, maps, quality_.round_neighbours);
   State state = problem.Resume(*maps[static_cast<size_t>(reference)], options);
   HypothesesFromSurfaces(problem.finest, &state);
   problem.SuggestBackground(&state);
@@ -348,7 +347,7 @@ DepthEstimate PatchMatchEngine::Filter(std::span<const StereoView> views, int re
                                        std::span<const int> neighbours, const DepthRange& range,
                                        std::span<const PlaneMap* const> maps,
                                        const EngineOptions& options) const {
-  Problem problem(views, reference, neighbours, range, maps, quality_.round_neighbours, options);
+  Problem problem(views, reference, neighbours, range, maps, quality_.round_neighbours);
   State state = problem.Resume(*maps[static_cast<size_t>(reference)], options);
   return Assessed(problem, &state, &without_planes_);
 }

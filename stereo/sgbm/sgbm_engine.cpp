@@ -79,8 +79,7 @@ struct Task {
 std::vector<Eigen::Vector3d> FindPlanes(const StereoView& reference, const GreyImage& picture,
                                         const std::vector<Pair>& pairs,
                                         const std::vector<GreyImage>& pictures,
-                                        const DepthRange& range, const PairLimits& limits,
-                                        const EngineOptions& options) {
+                                        const DepthRange& range, const PairLimits& limits) {
   const PinholeCamera& camera = reference.camera;
   PairLimits coarse = limits;
   coarse.scale = std::min(1.0, kCoarseSidePx / std::max(camera.width_px(), camera.height_px()));
@@ -158,7 +157,7 @@ DepthEstimate SgbmEngine::Estimate(std::span<const StereoView> views, int refere
   std::vector<GreyImage> pictures;
   for (const Pair& pair : pairs) pictures.push_back(MakeGreyImage(*pair.neighbour));
   const std::vector<Task> tasks =
-      TasksOf(pairs, FindPlanes(view, picture, pairs, pictures, range, limits_, options));
+      TasksOf(pairs, FindPlanes(view, picture, pairs, pictures, range, limits_));
   std::vector<PairDepth> sweeps(tasks.size());
   ParallelFor(0, static_cast<int>(tasks.size()), PairsAtOnce(pairs, options), [&](int i) {
     const Task& task = tasks[static_cast<size_t>(i)];

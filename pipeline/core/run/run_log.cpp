@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "dtr/base/machine.h"
+#include "dtr/base/parallel_for.h"
 #include "dtr/base/process.h"
 #include "dtr/base/utf8.h"
 
