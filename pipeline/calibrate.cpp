@@ -6,10 +6,11 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "calib/colmap/features.h"
+#include "calib/colmap/feature_plan.h"
 #include "calib/colmap/model_io.h"
 #include "calib/colmap/program.h"
 #include "calib/colmap/sfm.h"
+#include "calib/colmap/steps.h"
 #include "calib/models/fisheye.h"
 #include "capture/contents_json.h"
 #include "capture/image_circle.h"
@@ -173,6 +174,7 @@ std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
 
 colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options) {
   colmap::SfmOptions sfm;
+  sfm.colmap = &colmap::Steps();
   sfm.engine = options.sfm.engine;
   sfm.threads = options.threads;
   sfm.seed = options.seed;

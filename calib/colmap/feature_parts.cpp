@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <string>
 
-#include "calib/colmap/database.h"
-#include "calib/colmap/graph_database.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 
@@ -16,17 +14,17 @@ namespace {
 
 constexpr char kNote[] = ".begun", kPart[] = ".part_";
 
-// Everything beside the database of all that belongs to parts.
-std::vector<fs::path> FilesOfParts(const fs::path& database) {
-  const std::string prefix = database.filename().string() + kPart;
+// Everything beside the file of all that belongs to parts.
+std::vector<fs::path> FilesOfParts(const fs::path& all) {
+  const std::string prefix = all.filename().string() + kPart;
   std::vector<fs::path> files;
   std::error_code error;
-  fs::directory_iterator entry(database.parent_path(), error);
+  fs::directory_iterator entry(all.parent_path(), error);
   for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
     if (entry->path().filename().string().starts_with(prefix)) files.push_back(entry->path());
   }
   if (error) {
-    throw Error(database.parent_path().string() + ": cannot be listed: " + error.message());
+    throw Error(all.parent_path().string() + ": cannot be listed: " + error.message());
   }
   std::sort(files.begin(), files.end());
   return files;
@@ -34,31 +32,30 @@ std::vector<fs::path> FilesOfParts(const fs::path& database) {
 
 }  // namespace
 
-fs::path NoteOf(const fs::path& database) { return database.string() + kNote; }
+fs::path NoteOf(const fs::path& file) { return file.string() + kNote; }
 
-fs::path PartOf(const fs::path& database, const Part& part) {
-  return fmt::format("{}{}{}_of_{}", database.string(), kPart, part.index, part.count);
+fs::path PartOf(const fs::path& all, const Part& part) {
+  return fmt::format("{}{}{}_of_{}", all.string(), kPart, part.index, part.count);
 }
 
-FeatureParts::FeatureParts(Workspace& workspace, const fs::path& database) : database_(database) {
-  for (const fs::path& file : FilesOfParts(database)) {
+FeatureParts::FeatureParts(Workspace& workspace, const fs::path& all) : all_(all) {
+  for (const fs::path& file : FilesOfParts(all)) {
     if (file.extension() != kNote) continue;
     const fs::path part = fs::path(file).replace_extension();
-    if (!fs::exists(part) || !workspace.Kept(file)) continue;
-    for (const auto& [image_id, count] : ReadDatabaseMatches(part).features) {
-      part_of_.emplace(image_id, part);
-    }
+    if (!fs::exists(part)) continue;
+    if (const auto kept = workspace.Kept(file)) parts_.emplace_back(part, *kept);
   }
 }
 
-std::optional<sfm::Features> FeatureParts::Of(std::uint32_t image_id) const {
-  const auto part = part_of_.find(image_id);
-  if (part == part_of_.end()) return std::nullopt;
-  return ReadFeatures(part->second, image_id);
+std::optional<sfm::Features> FeatureParts::Of(size_t photo) const {
+  for (const sfm::FeatureFile& part : parts_) {
+    if (part.Has(photo)) return part.Of(photo);
+  }
+  return std::nullopt;
 }
 
 void FeatureParts::Remove() const {
-  for (const fs::path& file : FilesOfParts(database_)) RemoveTree(file);
+  for (const fs::path& file : FilesOfParts(all_)) RemoveTree(file);
 }
 
 }  // namespace dtr::colmap

@@ -1,40 +1,36 @@
-// calib/colmap/feature_parts.h -- features that several processes found, each in a database of its
-// own.
+// calib/colmap/feature_parts.h -- features that several processes found, each in a file of its own.
 #pragma once
-#include <cstdint>
 #include <filesystem>
-#include <map>
 #include <optional>
 #include <vector>
 
 #include "calib/colmap/workspace.h"
-#include "calib/sfm/view_graph.h"
+#include "calib/sfm/run/store.h"
 #include "dtr/base/part.h"
 
 namespace dtr::colmap {
 
-/// The note beside a database of features that says how much of it is whole (Workspace::Keep).
-std::filesystem::path NoteOf(const std::filesystem::path& database);
+/// The note beside a file of features that says how much of it is whole (Workspace::Keep).
+std::filesystem::path NoteOf(const std::filesystem::path& file);
 
-/// The database of a part, beside the one of all.
-std::filesystem::path PartOf(const std::filesystem::path& database, const Part& part);
+/// The file of a part, beside the one of all.
+std::filesystem::path PartOf(const std::filesystem::path& all, const Part& part);
 
-/// What lies in databases of parts whose notes have the fingerprint of the step that runs.
+/// What lies in files of parts whose notes have the fingerprint of the step that runs.
 class FeatureParts {
  public:
-  /// Takes over what the parts cost, too. `database`: the one of all. Throws Error where a database
-  /// with such a note is damaged.
-  FeatureParts(Workspace& workspace, const std::filesystem::path& database);
+  /// Takes over what the parts cost, too. Throws Error where a file with such a note is damaged.
+  FeatureParts(Workspace& workspace, const std::filesystem::path& all);
 
-  /// Features of an image by its id; nothing where no part has them. Called from any thread.
-  std::optional<sfm::Features> Of(std::uint32_t image_id) const;
+  /// Features of a photo; nothing where no part has them. Called from any thread.
+  std::optional<sfm::Features> Of(size_t photo) const;
 
-  /// Removes the databases of all parts, and what else lies beside them.
+  /// Removes the files of all parts, and what else lies beside them.
   void Remove() const;
 
  private:
-  std::filesystem::path database_;
-  std::map<std::uint32_t, std::filesystem::path> part_of_;
+  std::filesystem::path all_;
+  std::vector<sfm::FeatureFile> parts_;
 };
 
 }  // namespace dtr::colmap

@@ -7,15 +7,13 @@
 #include <mutex>
 #include <optional>
 
-#include "calib/colmap/database.h"
-#include "calib/colmap/graph_database.h"
-#include "calib/colmap/matching.h"
-#include "calib/colmap/model_io.h"
+#include "calib/colmap/colmap_steps.h"
 #include "calib/colmap/own_steps.h"
 #include "calib/colmap/pairs.h"
 #include "calib/colmap/sfm_steps.h"
 #include "calib/lens_groups.h"
 #include "calib/sfm/registration/register_view.h"
+#include "calib/sfm/run/store.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
@@ -35,9 +33,9 @@ struct Frozen {
   std::vector<SfmImageInput> sources;  // sorted by name, as their workspace has them
   std::vector<std::string> aliases;    // of `sources`, in their database
   std::vector<fs::path> files;         // of `sources`
-  fs::path database;
+  fs::path workspace;
   std::string fingerprint;      // of the model
-  bool forward_motion = false;  // its mapper needed AllowForwardMotion
+  bool forward_motion = false;  // its mapper needed other thresholds
 };
 
 // The sources on small images, looked at once, by the first photo that needs them; one photo's
@@ -83,26 +81,6 @@ std::optional<std::uint32_t> SharedCamera(const Frozen& frozen, const SfmImageIn
   return std::nullopt;
 }
 
-// The frozen model under the names its database knows. COLMAP puts the database's parameters, from
-// before refinement and perhaps of another lens model (it crashes then), in the place of a camera
-// that no registered image has: where `camera_id` is such a one, an image of the copy takes it.
-// Registration looks at points, not at other images' cameras.
-void WriteAliased(const fs::path& folder, const Frozen& frozen,
-                  std::optional<std::uint32_t> camera_id) {
-  calib::SfmModel model = frozen.model;
-  if (camera_id && !HasImages(model, *camera_id)) model.images.front().camera_id = *camera_id;
-  for (calib::SfmImage& image : model.images) {
-    const auto source = std::lower_bound(
-        frozen.sources.begin(), frozen.sources.end(), image.name,
-        [](const SfmImageInput& a, const std::string& name) { return a.name < name; });
-    if (source == frozen.sources.end() || source->name != image.name) {
-      throw UsageError(image.name + ": expected every image of the model among the sources");
-    }
-    image.name = frozen.aliases[static_cast<size_t>(source - frozen.sources.begin())];
-  }
-  WriteModel(folder, model, Format::kBinary);
-}
-
 // The sources to match a photo with: all, or the most resembling.
 std::vector<size_t> PartnersOf(Workspace& workspace, const Frozen& frozen, SmallSources& small) {
   std::vector<size_t> partners(frozen.sources.size());
@@ -114,47 +92,37 @@ std::vector<size_t> PartnersOf(Workspace& workspace, const Frozen& frozen, Small
   return partners;
 }
 
-void MatchWithSources(Workspace& workspace, const Frozen& frozen, SmallSources& small,
-                      const SfmOptions& options) {
-  std::vector<std::pair<std::string, std::string>> pairs;
-  for (const size_t i : PartnersOf(workspace, frozen, small)) {
-    pairs.emplace_back(workspace.AliasOf(0), frozen.aliases[i]);
+// What COLMAP needs for a photo's pose.
+RegistrationInput InputFor(Workspace& workspace, const Frozen& frozen, SmallSources& small) {
+  RegistrationInput input{frozen.workspace, frozen.model, {}, {}, frozen.forward_motion};
+  for (const calib::SfmImage& image : frozen.model.images) {
+    const auto source = std::lower_bound(
+        frozen.sources.begin(), frozen.sources.end(), image.name,
+        [](const SfmImageInput& a, const std::string& name) { return a.name < name; });
+    if (source == frozen.sources.end() || source->name != image.name) {
+      throw UsageError(image.name + ": expected every image of the model among the sources");
+    }
+    input.aliases.push_back(frozen.aliases[static_cast<size_t>(source - frozen.sources.begin())]);
   }
-  MatchPairs(workspace, workspace.database(), pairs, 1, options.seed);
-}
-
-void Register(Workspace& workspace, const Frozen& frozen, const SfmOptions& options,
-              std::optional<std::uint32_t> camera_id) {
-  const fs::path input = workspace.folder() / "source", output = workspace.folder() / "registered";
-  RemoveTree(input);
-  RemoveTree(output);
-  MakeFolder(output);
-  WriteAliased(input, frozen, camera_id);
-  Arguments arguments(workspace.program(), "image_registrator");
-  arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", options.seed))
-      .AddIfKnown({"Mapper.random_seed"}, fmt::format("{}", options.seed))
-      .Add({"database_path"}, workspace.database().string())
-      .Add({"input_path"}, input.string())
-      .Add({"output_path"}, output.string())
-      .Add({"Mapper.num_threads"}, "1");
-  if (frozen.forward_motion) AllowForwardMotion(arguments);
-  workspace.Run(arguments, nullptr);
-  RemoveTree(input);  // a copy of the frozen model per photo would fill the disk
+  for (const size_t i : PartnersOf(workspace, frozen, small)) {
+    input.partners.push_back(frozen.aliases[i]);
+  }
+  return input;
 }
 
 // The photo's pose by calib/sfm, as a model of it alone in registered/; none there: it has no pose.
 void RegisterHere(Workspace& workspace, const Frozen& frozen, SmallSources& small,
-                  const CameraGroup& group, const ExtractionPlan& plan, std::uint64_t seed) {
-  const fs::path output = workspace.folder() / "registered";
-  RemoveTree(output);
+                  const CameraGroup& group, const ExtractionPlan& plan, const SfmOptions& options,
+                  const fs::path& output) {
   std::map<std::string, const calib::SfmImage*> image_called;
   for (const calib::SfmImage& image : frozen.model.images) image_called[image.name] = &image;
+  const sfm::FeatureFile features(frozen.workspace / sfm::kFeatureFile);
   std::vector<sfm::SourceView> sources;
   for (const size_t i : PartnersOf(workspace, frozen, small)) {
     const auto found = image_called.find(frozen.sources[i].name);
     if (found == image_called.end()) continue;
-    sources.push_back({found->second, &frozen.model.cameras.at(found->second->camera_id),
-                       ReadFeatures(frozen.database, static_cast<std::uint32_t>(i + 1))});
+    sources.push_back(
+        {found->second, &frozen.model.cameras.at(found->second->camera_id), features.Of(i)});
   }
   const GroupLenses start = LensesOf(workspace, {group});
   const sfm::UnregisteredView view{
@@ -163,8 +131,8 @@ void RegisterHere(Workspace& workspace, const Frozen& frozen, SmallSources& smal
       group.camera_id ? frozen.model.cameras.at(*group.camera_id) : start.lenses.front(),
       group.camera_id.has_value(), start.focal_is_known.front()};
   const int min_inliers = frozen.forward_motion ? kMinInliersForward : kMinInliers;
-  auto registered =
-      sfm::RegisterView(view, sources, frozen.model, min_inliers, seed, workspace.progress());
+  auto registered = sfm::RegisterView(view, sources, frozen.model, min_inliers, options.seed,
+                                      workspace.progress());
   if (!registered) return;
   calib::SfmModel model;
   registered->image.id = registered->image.camera_id = group.camera_id.value_or(1);
@@ -175,7 +143,7 @@ void RegisterHere(Workspace& workspace, const Frozen& frozen, SmallSources& smal
     model.points.emplace(feature.point_id, frozen.model.points.at(feature.point_id));
   }
   model.images.push_back(std::move(registered->image));
-  WriteModel(output, model, Format::kBinary);
+  options.colmap->WriteModel(output, model);
 }
 
 struct Placed {
@@ -197,7 +165,7 @@ Placed Place(const fs::path& images_dir, const SfmImageInput& photo, const Froze
              SmallSources& small, const fs::path& folder, const SfmOptions& options,
              Progress& progress) {
   Workspace workspace(folder, images_dir, std::span(&photo, 1), kAliasPrefix, 1, progress,
-                      options.engine);
+                      VersionOf(options));
   auto groups = GroupCameras(workspace.images(), CameraModelOf(options), true);
   groups.front().camera_id = SharedCamera(frozen, photo, options.share_intrinsics_within_group);
   ExtractionPlan plan =
@@ -207,23 +175,22 @@ Placed Place(const fs::path& images_dir, const SfmImageInput& photo, const Froze
       fmt::format("model {} size {} seed {} {} [{}]{}", frozen.fingerprint, plan.max_image_size_px,
                   options.seed, options.lens_model, ParamsText(groups.front().params),
                   frozen.forward_motion ? " forward" : "");
+  const fs::path registered = workspace.folder() / "registered";
   workspace.Step("registration", inputs, [&] {
-    if (options.engine != SfmEngine::kColmap) {
-      workspace.RunHere(
-          [&] { RegisterHere(workspace, frozen, small, groups.front(), plan, options.seed); });
+    RemoveTree(registered);
+    if (options.engine == SfmEngine::kColmap) {
+      options.colmap->Register(workspace, InputFor(workspace, frozen, small), groups, plan, options,
+                               registered);
       return;
     }
-    CopyDatabase(frozen.database, workspace.database());
-    ExtractFeatures(workspace, workspace.database(), groups, plan, options.seed);
-    MatchWithSources(workspace, frozen, small, options);
-    Register(workspace, frozen, options, groups.front().camera_id);
-    RemoveDatabase(workspace.database());
+    workspace.RunHere(
+        [&] { RegisterHere(workspace, frozen, small, groups.front(), plan, options, registered); });
   });
   Placed placed;
   placed.runs = workspace.Report().steps;
   placed.version = workspace.version();
-  const fs::path registered = workspace.folder() / "registered";
-  const calib::SfmModel model = fs::exists(registered) ? ReadModel(registered) : calib::SfmModel{};
+  const calib::SfmModel model =
+      fs::exists(registered) ? options.colmap->ReadModel(registered) : calib::SfmModel{};
   for (const calib::SfmImage& image : model.images) {
     if (image.name != workspace.AliasOf(0)) continue;
     placed.camera = groups.front().camera_id ? frozen.model.cameras.at(*groups.front().camera_id)
@@ -236,10 +203,11 @@ Placed Place(const fs::path& images_dir, const SfmImageInput& photo, const Froze
   return placed;
 }
 
-std::string FingerprintOf(const calib::SfmModel& model, const fs::path& folder) {
+std::string FingerprintOf(const calib::SfmModel& model, const fs::path& folder,
+                          const ColmapSteps& colmap) {
   const fs::path copy = folder / "frozen";
   RemoveTree(copy);
-  WriteModel(copy, model, Format::kBinary);
+  colmap.WriteModel(copy, model);
   std::string text;
   for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"}) {
     text += Sha256OfFile(copy / name);
@@ -250,7 +218,7 @@ std::string FingerprintOf(const calib::SfmModel& model, const fs::path& folder) 
 
 Frozen FrozenFrom(const calib::SfmModel& model, std::span<const SfmImageInput> sources,
                   const fs::path& images_dir, const fs::path& source_workspace,
-                  const fs::path& workspace) {
+                  const fs::path& workspace, const ColmapSteps& colmap) {
   Frozen frozen{model, {sources.begin(), sources.end()}, {}, {}, {}, {}};
   frozen.forward_motion = fs::exists(source_workspace / kForwardMotionNote);
   std::sort(frozen.sources.begin(), frozen.sources.end(),
@@ -259,13 +227,8 @@ Frozen FrozenFrom(const calib::SfmModel& model, std::span<const SfmImageInput> s
     frozen.aliases.push_back(Workspace::AliasFor("", i, frozen.sources[i].name));
     frozen.files.push_back(images_dir / frozen.sources[i].name);
   }
-  frozen.database = fs::absolute(source_workspace) / "database.db";
-  if (!fs::exists(frozen.database)) {
-    throw Error(frozen.database.string() +
-                ": expected the database that made the source model, found none; run structure "
-                "from motion on the sources again");
-  }
-  frozen.fingerprint = FingerprintOf(model, workspace);
+  frozen.workspace = fs::absolute(source_workspace);
+  frozen.fingerprint = FingerprintOf(model, workspace, colmap);
   return frozen;
 }
 
@@ -301,7 +264,8 @@ HeldOutResult RegisterHeldOut(const fs::path& images_dir, std::span<const SfmIma
                               const SfmOptions& options, Progress& progress) {
   CameraModelOf(options);  // reject before any work
   MakeFolder(workspace);
-  const Frozen frozen = FrozenFrom(source_model, sources, images_dir, source_workspace, workspace);
+  const Frozen frozen =
+      FrozenFrom(source_model, sources, images_dir, source_workspace, workspace, *options.colmap);
   std::vector<SfmImageInput> photos(held_out.begin(), held_out.end());
   std::sort(photos.begin(), photos.end(),
             [](const auto& a, const auto& b) { return a.name < b.name; });

@@ -4,9 +4,8 @@
 
 #include <algorithm>
 
-#include "calib/colmap/database.h"
-#include "calib/colmap/graph_database.h"
-#include "calib/colmap/model_io.h"
+#include "calib/colmap/colmap_steps.h"
+#include "calib/colmap/own_steps.h"
 #include "calib/colmap/point_colours.h"
 #include "calib/colmap/sfm_steps.h"
 #include "calib/colmap/view_pyramids.h"
@@ -80,27 +79,6 @@ std::string TextOf(const KnownCameras& known) {
   return text;
 }
 
-void CheckKept(const std::string& where, const KnownCameras& known, const calib::SfmModel& model) {
-  double extent = 1;
-  for (const auto& image : known.images) {
-    extent = std::max(extent, image.cam_from_world.translation.cwiseAbs().maxCoeff());
-  }
-  for (const calib::SfmImage& image : model.images) {
-    const auto given = std::find_if(known.images.begin(), known.images.end(),
-                                    [&](const auto& other) { return other.name == image.name; });
-    const Pose& a = image.cam_from_world;
-    const Pose& b = given->cam_from_world;
-    if (a.rotation.angularDistance(b.rotation) > kPoseKept ||
-        (a.translation - b.translation).norm() > kPoseKept * extent) {
-      throw Error(
-          fmt::format("{}: image {}: expected the given pose back from colmap "
-                      "point_triangulator, found another; this version of COLMAP refines "
-                      "poses",
-                      where, image.name));
-    }
-  }
-}
-
 // Puts the given cameras and poses, bit for bit, around the features and points COLMAP found.
 calib::SfmModel WithGivenCameras(const KnownCameras& known, calib::SfmModel found) {
   calib::SfmModel model = known.model;
@@ -113,93 +91,30 @@ calib::SfmModel WithGivenCameras(const KnownCameras& known, calib::SfmModel foun
   return model;
 }
 
-// The posed model under the numbers of the database, which extractor threads hand out as they go.
-calib::SfmModel NumberedAsInDatabase(const Workspace& workspace, const KnownCameras& known) {
-  const auto ids = ReadDatabaseIds(workspace.database());
-  calib::SfmModel model;
-  for (size_t i = 0; i < known.images.size(); ++i) {
-    const auto in_database = ids.find(workspace.AliasOf(i));
-    if (in_database == ids.end()) {
-      throw Error(
-          fmt::format("{}: expected every photo in the database, found that COLMAP left out "
-                      "{}; it may not be able to read the file",
-                      workspace.database().string(), known.images[i].name));
-    }
-    calib::SfmImage& image = model.images.emplace_back(known.model.images[i]);
-    image.id = in_database->second.image_id;
-    image.camera_id = in_database->second.camera_id;
-    model.cameras[image.camera_id] = known.images[i].camera;
-  }
-  return model;
-}
-
-// What to say where COLMAP's triangulator fails, as it does where there is nothing to triangulate.
-void RequireMatches(const Workspace& workspace, const KnownCameras& known) {
-  if (!ReadDatabaseMatches(workspace.database()).pairs.empty()) return;
-  throw Error(fmt::format(
-      "expected photos that show the same points to triangulate, found that no two of the {} have "
-      "any in common; photos must overlap and show texture",
-      known.images.size()));
-}
-
-void Triangulate(Workspace& workspace, const KnownCameras& known, const SfmOptions& options) {
-  const fs::path input = workspace.folder() / "posed", output = workspace.folder() / "triangulated";
-  for (const fs::path& folder : {input, output, workspace.folder() / "model"}) RemoveTree(folder);
-  MakeFolder(output);
-  workspace.WriteModelHere(input, NumberedAsInDatabase(workspace, known));
-  Arguments arguments(workspace.program(), "point_triangulator");
-  arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", options.seed))
-      .Add({"database_path"}, workspace.database().string())
-      .Add({"image_path"}, workspace.images_folder().string())
-      .Add({"input_path"}, input.string())
-      .Add({"output_path"}, output.string())
-      .Add({"Mapper.num_threads"}, std::to_string(workspace.threads()))
-      .Add({"Mapper.ba_refine_focal_length"}, "0")
-      .Add({"Mapper.ba_refine_principal_point"}, "0")
-      .Add({"Mapper.ba_refine_extra_params"}, "0")
-      .AddIfKnown({"refine_intrinsics"}, "0")
-      // Known poses vouch for a point that only two photos show; with two photos there is no other.
-      .Add({"Mapper.tri_ignore_two_view_tracks"}, "0");
-  workspace.progress().Stage("triangulation", static_cast<int>(workspace.images().size()));
-  int done = 0;
-  try {
-    workspace.Run(arguments, [&](const std::string& line) {
-      if (line.find("Triangulating image #") != std::string::npos) {
-        workspace.progress().Update(++done);
-      }
-    });
-  } catch (const Interrupted&) {
-    throw;
-  } catch (const Error&) {
-    RequireMatches(workspace, known);
-    throw;
-  }
-  calib::SfmModel found = workspace.ReadModelHere(output);
-  CheckKept(output.string(), known, found);
-  WriteModel(workspace.folder() / "model", WithGivenCameras(known, std::move(found)),
-             Format::kBinary);
-}
-
-// As Triangulate, by calib/sfm.
-void TriangulateHere(Workspace& workspace, const KnownCameras& known) {
-  RemoveTree(workspace.folder() / "model");
-  RequireMatches(workspace, known);
+calib::SfmModel TriangulateHere(Workspace& workspace, const KnownCameras& known) {
+  RequireMatches(SummaryOf(workspace).pairs.size(), known.images.size());
   workspace.progress().Stage("triangulation", 0);
+  calib::SfmModel found;
   workspace.RunHere([&] {
-    sfm::ViewGraph graph = ReadViewGraph(workspace.database());
+    sfm::ViewGraph graph = ReadGraph(workspace);
     std::vector<Pose> poses;
-    for (size_t i = 0; i < graph.images.size(); ++i) {
-      graph.images[i].name = known.images[i].name;
-      poses.push_back(known.images[i].cam_from_world);
-    }
+    for (const PosedImage& image : known.images) poses.push_back(image.cam_from_world);
     for (size_t c = 0; c < graph.cameras.size(); ++c) {
       graph.cameras[c] = known.model.cameras.at(static_cast<std::uint32_t>(c + 1));
     }
-    calib::SfmModel found = sfm::TriangulateMatches(graph, poses, workspace.threads());
+    found = sfm::TriangulateMatches(graph, poses, workspace.threads());
     ColourPoints(workspace, found);
-    WriteModel(workspace.folder() / "model", WithGivenCameras(known, std::move(found)),
-               Format::kBinary);
   });
+  return found;
+}
+
+void TriangulationStep(Workspace& workspace, const KnownCameras& known, const SfmOptions& options) {
+  const fs::path folder = workspace.folder() / "model";
+  RemoveTree(folder);
+  calib::SfmModel found = options.engine == SfmEngine::kColmap
+                              ? options.colmap->Triangulate(workspace, known.model, options)
+                              : TriangulateHere(workspace, known);
+  options.colmap->WriteModel(folder, WithGivenCameras(known, std::move(found)));
 }
 
 // COLMAP 3 ends without a word at a camera model that it does not know.
@@ -218,7 +133,7 @@ void RequireColmapsModels(std::span<const PosedImage> images) {
 
 // All matches that agree with a geometry of their pair.
 std::vector<calib::MatchedPair> MatchesIn(const Workspace& workspace) {
-  const sfm::ViewGraph graph = ReadViewGraph(workspace.database());
+  const sfm::ViewGraph graph = ReadGraph(workspace);
   std::vector<calib::MatchedPair> pairs;
   for (const sfm::PairGeometry& pair : graph.pairs) {
     calib::MatchedPair& out = pairs.emplace_back();
@@ -244,6 +159,14 @@ std::vector<std::string> ImagesWithoutPoints(const calib::SfmModel& model) {
 
 }  // namespace
 
+void RequireMatches(size_t pairs, size_t photos) {
+  if (pairs > 0) return;
+  throw Error(fmt::format(
+      "expected photos that show the same points to triangulate, found that no two of the {} have "
+      "any in common; photos must overlap and show texture",
+      photos));
+}
+
 std::vector<calib::MatchedPair> MatchWithoutCameras(const fs::path& images_dir,
                                                     std::span<const PosedImage> images,
                                                     const fs::path& workspace_folder,
@@ -252,7 +175,7 @@ std::vector<calib::MatchedPair> MatchWithoutCameras(const fs::path& images_dir,
   options.engine = SfmEngine::kGlobal;
   const std::vector<SfmImageInput> inputs = InputsOf(images);
   Workspace workspace(workspace_folder, images_dir, inputs, "", ResolveThreads(options.threads),
-                      progress, options.engine, options.folder_is_shared);
+                      progress, VersionOf(options), options.folder_is_shared);
   SfmReport report;
   FeaturesAndMatches(workspace, GroupCameras(workspace.images(), CameraModelOf(options), true),
                      options, report);
@@ -269,7 +192,7 @@ SfmResult TriangulateWithPoses(const fs::path& images_dir, std::span<const Posed
   if (options.engine == SfmEngine::kColmap) RequireColmapsModels(images);
   const KnownCameras known = Arranged(images);
   Workspace workspace(workspace_folder, images_dir, InputsOf(known.images), "",
-                      ResolveThreads(options.threads), progress, options.engine,
+                      ResolveThreads(options.threads), progress, VersionOf(options),
                       options.folder_is_shared);
   if (options.part && options.part->stage == SfmStage::kPhotos) throw PartDone();
   SfmResult result;
@@ -278,12 +201,9 @@ SfmResult TriangulateWithPoses(const fs::path& images_dir, std::span<const Posed
   FeaturesAndMatches(workspace, known.groups, options, result.report,
                      pairs.empty() ? std::nullopt : std::optional(pairs), true);
   std::string inputs = TextOf(known) + fmt::format("seed {}", options.seed);
-  const bool by_colmap = options.engine == SfmEngine::kColmap;
-  workspace.Step("triangulation", inputs, [&] {
-    by_colmap ? Triangulate(workspace, known, options) : TriangulateHere(workspace, known);
-  });
-  result.model = ReadModel(workspace.folder() / "model");
-  if (!by_colmap) result.matches = MatchesIn(workspace);
+  workspace.Step("triangulation", inputs, [&] { TriangulationStep(workspace, known, options); });
+  result.model = options.colmap->ReadModel(workspace.folder() / "model");
+  if (options.engine != SfmEngine::kColmap) result.matches = MatchesIn(workspace);
   CompleteReport(workspace, result.model, result.report);
   result.report.not_registered = ImagesWithoutPoints(result.model);
   WriteReport(workspace.folder(), result.report);

@@ -18,16 +18,15 @@ struct PosedImage {
   std::filesystem::path mask_file = {};  ///< as SfmImageInput has
 };
 
-/// COLMAP may return a pose it was told to keep with its quaternion normalised once more; more
-/// than this (radians; relative to the largest coordinate) means that it moved the camera.
-inline constexpr double kPoseKept = 1e-9;
+/// Throws Error where no pairs of as many photos have anything in common.
+void RequireMatches(size_t pairs, size_t photos);
 
 /// Features, matching and point triangulation with poses and intrinsics held fixed. The model that
 /// comes back carries exactly the given cameras and poses (a camera per distinct LensCamera) and
 /// all images, in order of names. Workspace, checkpoints and errors as in RunSfm;
 /// options.lens_model and share_intrinsics_within_group have no say here. Throws Error also when
-/// COLMAP moved a camera by more than kPoseKept. A report that lists not_registered names photos
-/// without any point.
+/// COLMAP moved a camera by more than 1e-9 (colmap/triangulator.cpp). A report that lists
+/// not_registered names photos without any point.
 SfmResult TriangulateWithPoses(const std::filesystem::path& images_dir,
                                std::span<const PosedImage> images,
                                const std::filesystem::path& workspace, const SfmOptions& options,

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "calib/colmap/features.h"
 #include "calib/colmap/pairs.h"
 
 namespace dtr::colmap {
@@ -18,9 +17,9 @@ constexpr int kBlockPhotos = 10;
 constexpr int kSequentialOverlap = 10;
 constexpr double kMatcherGib = 0.5;
 
-Arguments MatcherArguments(Workspace& workspace, const char* command,
+Arguments MatcherArguments(Program& program, const char* command,
                            const std::filesystem::path& database, int threads, std::uint64_t seed) {
-  Arguments arguments(workspace.program(), command);
+  Arguments arguments(program, command);
   arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", seed))
       .Add({"database_path"}, database.string())
       .Add({"SiftMatching.use_gpu", "FeatureMatching.use_gpu"}, "0")
@@ -31,7 +30,7 @@ Arguments MatcherArguments(Workspace& workspace, const char* command,
 void RunMatcher(Workspace& workspace, const Arguments& arguments) {
   constexpr int kPercent = 100;
   workspace.progress().Stage("matching", kPercent);
-  workspace.Run(arguments, [&](const std::string& line) {
+  RunStep(workspace, arguments, [&](const std::string& line) {
     if (const int percent = MatchingPercent(line); percent >= 0) {
       workspace.progress().Update(percent);
     }
@@ -68,11 +67,6 @@ std::optional<ImagePairs> PairsToMatch(Workspace& workspace, Matching matching, 
 
 }  // namespace
 
-Matching ResolveMatching(Matching matching, size_t images) {
-  if (matching != Matching::kAuto) return matching;
-  return images <= kExhaustiveLimit ? Matching::kExhaustive : Matching::kPreselected;
-}
-
 int MatchingThreads(int threads, double memory_gb) {
   return std::clamp(static_cast<int>(kFill * memory_gb / kMatcherGib), 1, threads);
 }
@@ -93,30 +87,31 @@ int MatchingPercent(const std::string& line) {
                           (static_cast<double>(rows) * columns));
 }
 
-void MatchPairs(Workspace& workspace, const std::filesystem::path& database,
+void MatchPairs(Program& program, Workspace& workspace, const std::filesystem::path& database,
                 const std::vector<std::pair<std::string, std::string>>& pairs, int threads,
                 std::uint64_t seed) {
   std::vector<std::string> lines;
   for (const auto& [a, b] : pairs) lines.push_back(a + " " + b);
-  Arguments arguments = MatcherArguments(workspace, "matches_importer", database, threads, seed);
+  Arguments arguments = MatcherArguments(program, "matches_importer", database, threads, seed);
   arguments.Add({"match_list_path"}, workspace.WriteList("pairs.txt", lines).string())
       .Add({"match_type"}, "pairs");
   RunMatcher(workspace, arguments);
 }
 
-void MatchPhotos(Workspace& workspace, const std::filesystem::path& database, Matching matching,
-                 double memory_gb, std::uint64_t seed, const std::optional<ImagePairs>& allowed) {
+void MatchPhotos(Program& program, Workspace& workspace, const std::filesystem::path& database,
+                 Matching matching, double memory_gb, std::uint64_t seed,
+                 const std::optional<ImagePairs>& allowed) {
   const int threads = MatchingThreads(workspace.threads(), memory_gb);
   if (const auto pairs = PairsToMatch(workspace, matching, memory_gb, allowed)) {
     std::vector<std::pair<std::string, std::string>> names;
     for (const auto& [a, b] : *pairs)
       names.emplace_back(workspace.AliasOf(a), workspace.AliasOf(b));
-    MatchPairs(workspace, database, names, threads, seed);
+    MatchPairs(program, workspace, database, names, threads, seed);
     return;
   }
   const bool sequential = matching == Matching::kSequential;
   Arguments arguments = MatcherArguments(
-      workspace, sequential ? "sequential_matcher" : "exhaustive_matcher", database, threads, seed);
+      program, sequential ? "sequential_matcher" : "exhaustive_matcher", database, threads, seed);
   if (sequential) {
     arguments.Add({"SequentialMatching.overlap"}, std::to_string(kSequentialOverlap))
         .Add({"SequentialMatching.quadratic_overlap"}, "1");

@@ -10,7 +10,7 @@
 #include "calib/bundle/bundle.h"
 #include "calib/bundle/degeneracy.h"
 #include "calib/bundle/refine.h"
-#include "calib/colmap/graph_database.h"
+#include "calib/colmap/colmap_steps.h"
 #include "calib/colmap/own_steps.h"
 #include "calib/colmap/parallax.h"
 #include "calib/colmap/sfm_steps.h"
@@ -50,7 +50,7 @@ Undetermined UndeterminedOf(Workspace& workspace, const calib::SfmModel& model,
   const bool suspicious = std::any_of(found.begin(), found.end(), [](const auto& degeneracy) {
     return degeneracy.name != "duplicate_images" && degeneracy.name != "too_few_views";
   });
-  if (!suspicious && LackOfParallax(CountPairs(workspace)).empty()) return {};
+  if (!suspicious && LackOfParallax(CountPairs(SummaryOf(workspace))).empty()) return {};
   calib::RefineOptions refine;
   refine.threads = options.threads;
   refine.seed = options.seed;
@@ -77,7 +77,7 @@ std::optional<Doubtful> DropContradicted(Workspace& workspace,
                                          const std::vector<CameraGroup>& groups,
                                          std::vector<calib::SfmModel>& colmaps) {
   if (colmaps.empty()) return std::nullopt;
-  sfm::ViewGraph graph = ReadViewGraph(workspace.database());
+  sfm::ViewGraph graph = ReadGraph(workspace);
   // What EXIF says contradicts nothing; what pairs voted for does.
   const GroupLenses exif = LensesOf(workspace, groups);
   for (size_t i = 0; i < graph.cameras.size() && i < exif.lenses.size(); ++i) {
@@ -85,7 +85,6 @@ std::optional<Doubtful> DropContradicted(Workspace& workspace,
         exif.focal_is_known[i] && graph.cameras[i].params[0] == exif.lenses[i].params[0];
     if (is_exifs) graph.focal_is_known[i] = 0;
   }
-  for (sfm::GraphImage& image : graph.images) image.name = workspace.NameOfAlias(image.name);
   std::string why = sfm::WhyContradicted(graph, colmaps.front(), workspace.threads());
   if (why.empty()) return std::nullopt;
   Doubtful dropped{std::move(colmaps.front()), std::move(why), true};
@@ -122,7 +121,7 @@ bool TakeColmaps(Workspace& workspace, const Own& own, const calib::SfmModel& co
 std::string WhyAsked(const Workspace& workspace, const Own& own) {
   const GloballyMapped& ours = own.mapped;
   if (!ours.why_not.empty()) {
-    const std::string lack = LackOfParallax(CountPairs(workspace));
+    const std::string lack = LackOfParallax(CountPairs(SummaryOf(workspace)));
     return lack.empty() ? ours.why_not : ours.why_not + "; " + lack;
   }
   if (!own.undetermined.clause.empty()) return own.undetermined.clause;
@@ -169,7 +168,7 @@ bool IsModel(Workspace& workspace, const calib::SfmModel& model, const SfmOption
   if (photos < kFewest || 2 * photos < workspace.images().size() || model.points.empty()) {
     return false;
   }
-  if (CameraStoodStill(CountPairs(workspace))) return false;
+  if (CameraStoodStill(CountPairs(SummaryOf(workspace)))) return false;
   try {
     return UndeterminedOf(workspace, model, options).clause.empty();
   } catch (const Interrupted&) {
@@ -213,11 +212,11 @@ std::vector<calib::SfmModel> TakeInDoubt(Workspace& workspace, const Own& own,
 }
 
 // COLMAP's models; where there is one of ours, a failure of COLMAP is no reason to lose it.
-std::vector<calib::SfmModel> AskColmap(
-    Workspace& workspace, const std::function<bool()>& there_is_ours,
-    const std::function<std::vector<calib::SfmModel>()>& by_colmap) {
+std::vector<calib::SfmModel> AskColmap(Workspace& workspace, const std::vector<CameraGroup>& groups,
+                                       const SfmOptions& options,
+                                       const std::function<bool()>& there_is_ours) {
   try {
-    return by_colmap();
+    return options.colmap->Map(workspace, groups, options);
   } catch (const Interrupted&) {
     throw;
   } catch (const Error& error) {
@@ -239,7 +238,7 @@ Own MapOwn(Workspace& workspace, const std::vector<CameraGroup>& groups, const S
 // Whether EXIF knows every focal length and no vote of the matches changed one.
 bool AllFocalsAreExifs(const Workspace& workspace, const std::vector<CameraGroup>& groups) {
   const GroupLenses exif = LensesOf(workspace, groups);
-  const sfm::ViewGraph graph = ReadViewGraph(workspace.database());
+  const sfm::ViewGraph graph = ReadGraph(workspace);
   if (graph.cameras.size() != exif.lenses.size()) return false;
   for (size_t i = 0; i < exif.lenses.size(); ++i) {
     const bool is_exifs =
@@ -273,10 +272,10 @@ bool MayBeExtended(const Workspace& workspace, const calib::SfmModel& model) {
   if (model.images.size() == workspace.images().size()) return false;
   std::set<std::string> names;
   for (const calib::SfmImage& image : model.images) names.insert(image.name);
-  const sfm::ViewGraph graph = ReadViewGraph(workspace.database());
+  const sfm::ViewGraph graph = ReadGraph(workspace);
   std::vector<char> placed;
   for (const sfm::GraphImage& image : graph.images) {
-    placed.push_back(names.contains(workspace.NameOfAlias(image.name)));
+    placed.push_back(names.contains(image.name));
   }
   std::vector<size_t> matches(placed.size());
   for (const sfm::PairGeometry& pair : graph.pairs) {
@@ -299,7 +298,7 @@ bool HasStations(const Workspace& workspace) {
 // Whether COLMAP's mapper is to be asked: it works, or a note says why not.
 bool CanAsk(Workspace& workspace, const SfmOptions& options, const std::string& why) {
   if (options.engine != SfmEngine::kAuto) return false;
-  const Program::State state = Program::Find();
+  const ColmapState state = options.colmap->Find();
   if (state.Works()) return true;
   workspace.progress().Note(fmt::format(
       "global mapper: {}; with COLMAP {} its mapper would be tried, too", why,
@@ -309,9 +308,9 @@ bool CanAsk(Workspace& workspace, const SfmOptions& options, const std::string& 
 
 }  // namespace
 
-std::vector<calib::SfmModel> MapOrFallBack(
-    Workspace& workspace, const std::vector<CameraGroup>& groups, const SfmOptions& options,
-    const std::function<std::vector<calib::SfmModel>()>& by_colmap) {
+std::vector<calib::SfmModel> MapOrFallBack(Workspace& workspace,
+                                           const std::vector<CameraGroup>& groups,
+                                           const SfmOptions& options) {
   Own own = MapOwn(workspace, groups, options, false);
   if (HasStations(workspace) && !own.mapped.model.images.empty()) {
     // Views of a plain ceiling alone may stand anywhere. What their stations make of them is tested
@@ -342,8 +341,8 @@ std::vector<calib::SfmModel> MapOrFallBack(
   if (ask) {
     workspace.progress().Note(
         fmt::format("global mapper: {}; trying COLMAP's mapper on the same matches", why));
-    colmaps = AskColmap(
-        workspace, [&] { return passes || IsModel(workspace, ours.model, options); }, by_colmap);
+    colmaps = AskColmap(workspace, groups, options,
+                        [&] { return passes || IsModel(workspace, ours.model, options); });
   }
   const bool made_none = colmaps.empty();
   auto dropped = DropContradicted(workspace, groups, colmaps);

@@ -7,15 +7,15 @@
 #include <functional>
 #include <map>
 
-#include "calib/colmap/database.h"
 #include "calib/colmap/feature_parts.h"
-#include "calib/colmap/graph_database.h"
+#include "calib/colmap/parallax.h"
 #include "calib/colmap/point_colours.h"
 #include "calib/models/fisheye.h"
 #include "calib/sfm/features/sift.h"
 #include "calib/sfm/mapping/global_mapper.h"
 #include "calib/sfm/matching/match_photos.h"
 #include "calib/sfm/matching/pair_journal.h"
+#include "calib/sfm/run/store.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
@@ -48,9 +48,6 @@ Grid<std::uint8_t> GreyOf(const ImageRgb8& image) {
   return grey;
 }
 
-// Of images()[image] in a database.
-std::uint32_t IdOf(size_t image) { return static_cast<std::uint32_t>(image + 1); }
-
 // All photos in the order of groups.
 std::vector<size_t> InOrder(const std::vector<CameraGroup>& groups) {
   std::vector<size_t> images;
@@ -60,14 +57,10 @@ std::vector<size_t> InOrder(const std::vector<CameraGroup>& groups) {
   return images;
 }
 
-void CreateDatabase(const Workspace& workspace, const fs::path& database,
-                    const std::vector<CameraGroup>& groups) {
-  const GroupLenses known = LensesOf(workspace, groups);
-  std::vector<DatabaseImage> images(workspace.images().size());
-  for (size_t g = 0; g < groups.size(); ++g) {
-    for (const size_t i : groups[g].images) images[i] = {workspace.AliasOf(i), static_cast<int>(g)};
-  }
-  CreateGraphDatabase(database, known.lenses, known.focal_is_known, images);
+std::vector<std::string> NamesOf(const Workspace& workspace) {
+  std::vector<std::string> names;
+  for (const SfmImageInput& image : workspace.images()) names.push_back(image.name);
+  return names;
 }
 
 // The pairs to be matched, or chosen from; nothing: all.
@@ -146,8 +139,8 @@ namespace {
 // Features of photos, from wherever.
 using FindFeatures = std::function<sfm::Features(size_t image)>;
 
-// Adds those of `images` to a database, of which `kept` is there already.
-void AddInBatches(Workspace& workspace, const fs::path& database, const std::vector<size_t>& images,
+// Adds those of `images` to a file, of which `kept` is there already.
+void AddInBatches(Workspace& workspace, const fs::path& file, const std::vector<size_t>& images,
                   size_t kept, const ExtractionPlan& plan, const FindFeatures& find) {
   workspace.progress().Stage("features", static_cast<int>(images.size()));
   workspace.progress().Update(static_cast<int>(kept));
@@ -162,64 +155,74 @@ void AddInBatches(Workspace& workspace, const fs::path& database, const std::vec
         features[static_cast<size_t>(i)] = find(batch[static_cast<size_t>(i)]);
         workspace.progress().Update(++done);
       });
-      AddFeatures(database, batch, features);
+      sfm::FeatureFile::Add(file, batch, features);
     });
-    SyncFile(database);
-    workspace.Keep(NoteOf(database), begin + count);
+    workspace.Keep(NoteOf(file), begin + count);
   }
 }
 
-// How many photos a database has that an earlier call with this fingerprint made; else an empty
-// one, and 0.
-size_t KeptOrNew(Workspace& workspace, const fs::path& database,
-                 const std::vector<CameraGroup>& groups) {
-  const fs::path note = NoteOf(database);
-  const size_t kept = fs::exists(database) ? workspace.Kept(note).value_or(0) : 0;
-  if (kept > 0) return kept;
-  // A note must never meet features of other photos: it goes before a new database comes.
+// How many photos a file has that an earlier call with this fingerprint made; else an empty one,
+// and 0.
+size_t KeptOrNew(Workspace& workspace, const fs::path& file) {
+  const fs::path note = NoteOf(file);
+  const size_t kept = fs::exists(file) ? workspace.Kept(note).value_or(0) : 0;
+  if (kept > 0 && sfm::FeatureFile::CutAfter(file, kept)) return kept;
+  // A note must never meet features of other photos: it goes before a new file comes.
   RemoveTree(note);
   SyncFolder(note.parent_path());
-  RemoveDatabase(database);  // with the journal of a killed write, which SQLite would play back
-  const fs::path working = database.string() + ".working";
-  CreateDatabase(workspace, working, groups);
-  MoveDatabase(working, database);
+  sfm::FeatureFile::Create(file);
   return 0;
+}
+
+// What versions that had features and matches in databases left.
+void RemoveDatabases(Workspace& workspace) {
+  bool any = false;
+  for (const auto& entry : fs::directory_iterator(workspace.folder())) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with("features.db") && !name.starts_with("database.db")) continue;
+    any = true;
+    RemoveTree(entry.path());
+  }
+  if (!any) return;
+  workspace.progress().Note(
+      "features and matches of another version or of COLMAP are removed: structure from motion "
+      "begins again");
 }
 
 }  // namespace
 
-void OwnFeatures(Workspace& workspace, const fs::path& database,
-                 const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
-                 const std::optional<SfmPart>& part) {
+void OwnFeatures(Workspace& workspace, const std::vector<CameraGroup>& groups,
+                 const ExtractionPlan& plan, const std::optional<SfmPart>& part) {
+  const fs::path all = workspace.folder() / sfm::kFeatureFile;
+  const std::vector<size_t> images = InOrder(groups);
   const FindFeatures detect = [&](size_t image) {
     return FeaturesOf(workspace.FileOf(image), workspace.images()[image].mask_file,
                       plan.max_image_size_px, plan.max_features);
   };
-  const std::vector<size_t> images = InOrder(groups);
   if (part && part->stage == SfmStage::kFeatures) {
     const std::vector<size_t> own(
         images.begin() + static_cast<std::ptrdiff_t>(part->part.Begin(images.size())),
         images.begin() + static_cast<std::ptrdiff_t>(part->part.End(images.size())));
-    const fs::path file = PartOf(database, part->part);
-    AddInBatches(workspace, file, own, KeptOrNew(workspace, file, groups), plan, detect);
+    const fs::path file = PartOf(all, part->part);
+    AddInBatches(workspace, file, own, KeptOrNew(workspace, file), plan, detect);
     throw PartDone();
   }
   if (part && part->stage != SfmStage::kPairs) {
     throw Error("features: expected those of all photos, found none; run the stage pairs first");
   }
-  const FeatureParts parts(workspace, database);
-  AddInBatches(workspace, database, images, KeptOrNew(workspace, database, groups), plan,
-               [&](size_t image) {
-                 const auto found = parts.Of(IdOf(image));
-                 return found ? *found : detect(image);
-               });
+  RemoveDatabases(workspace);
+  const FeatureParts parts(workspace, all);
+  AddInBatches(workspace, all, images, KeptOrNew(workspace, all), plan, [&](size_t image) {
+    const auto found = parts.Of(image);
+    return found ? *found : detect(image);
+  });
   parts.Remove();
 }
 
-void OwnMatches(Workspace& workspace, const fs::path& features,
-                const std::vector<CameraGroup>& groups, Matching matching,
+void OwnMatches(Workspace& workspace, const std::vector<CameraGroup>& groups, Matching matching,
                 const SfmOptions& options, bool known_lenses,
                 const std::optional<ImagePairs>& allowed) {
+  const sfm::FeatureFile features(workspace.folder() / sfm::kFeatureFile);
   GroupLenses known = LensesOf(workspace, groups);
   std::vector<sfm::MatchPhoto> photos;
   std::vector<int> group_of(workspace.images().size());
@@ -229,7 +232,7 @@ void OwnMatches(Workspace& workspace, const fs::path& features,
   for (size_t i = 0; i < workspace.images().size(); ++i) {
     const SfmImageInput& image = workspace.images()[i];
     photos.push_back({image.name, image.width_px, image.height_px, group_of[i], {}});
-    photos.back().features.keypoints = ReadKeypoints(features, IdOf(i));
+    photos.back().features.keypoints = features.KeypointsOf(i);
   }
   sfm::MatchOptions match;
   match.threads = workspace.threads();
@@ -238,8 +241,7 @@ void OwnMatches(Workspace& workspace, const fs::path& features,
   match.pairs = PairsFor(workspace.images(), matching, allowed);
   match.preselect = matching == Matching::kPreselected;
   match.load_descriptors = [&](int photo, size_t first) {
-    const auto i = static_cast<size_t>(photo);
-    return ReadDescriptors(features, IdOf(i), photos[i].features.keypoints.size(), first);
+    return features.DescriptorsOf(static_cast<size_t>(photo), first);
   };
   match.descriptor_gb = kDescriptorShare * options.memory_gb;
   match.journal = workspace.folder() / "matches.begun";
@@ -249,11 +251,35 @@ void OwnMatches(Workspace& workspace, const fs::path& features,
   workspace.RunHere([&] {
     sfm::MatchResult result = sfm::MatchPhotos(photos, known.lenses, known.focal_is_known, match);
     for (const std::string& note : result.notes) workspace.progress().Note(note);
-    CopyDatabase(features, workspace.database());
-    for (size_t i = 0; i < photos.size(); ++i) result.graph.images[i].name = workspace.AliasOf(i);
-    WriteViewGraph(workspace.database(), result.graph);
+    sfm::WriteMatches(workspace.folder() / sfm::kMatchFile, result.graph);
   });
   sfm::matching::PairJournal::Remove(match.journal);
+}
+
+sfm::ViewGraph ReadGraph(const Workspace& workspace) {
+  return sfm::ReadMatches(workspace.folder() / sfm::kMatchFile,
+                          sfm::FeatureFile(workspace.folder() / sfm::kFeatureFile),
+                          NamesOf(workspace));
+}
+
+sfm::MatchSummary SummaryOf(const Workspace& workspace) {
+  const sfm::ViewGraph graph = ReadGraph(workspace);
+  sfm::MatchSummary summary;
+  for (const sfm::GraphImage& image : graph.images) {
+    summary.features.push_back(static_cast<std::int64_t>(image.pixels.size()));
+  }
+  for (const sfm::PairGeometry& pair : graph.pairs) {
+    const auto a = static_cast<size_t>(pair.image_a), b = static_cast<size_t>(pair.image_b);
+    std::vector<double> moved_px;
+    for (const auto& [in_a, in_b] : pair.matches) {
+      moved_px.push_back((graph.images[a].pixels[in_a] - graph.images[b].pixels[in_b]).norm());
+    }
+    summary.pairs.push_back(
+        {a, b, static_cast<std::int64_t>(pair.matches.size()),
+         pair.kind == sfm::PairKind::kPlanar || pair.kind == sfm::PairKind::kRotation,
+         AreStill(moved_px, workspace.images()[a])});
+  }
+  return summary;
 }
 
 namespace {
@@ -275,9 +301,7 @@ void SetStations(const Workspace& workspace, sfm::ViewGraph* graph) {
 
 GloballyMapped MapHere(Workspace& workspace, const SfmOptions& options,
                        const std::optional<GroupLenses>& fixed, bool focals_hold) {
-  sfm::ViewGraph graph = ReadViewGraph(workspace.database());
-  // Under the photos' own names, which messages name.
-  for (sfm::GraphImage& image : graph.images) image.name = workspace.NameOfAlias(image.name);
+  sfm::ViewGraph graph = ReadGraph(workspace);
   if (fixed) graph.cameras = fixed->lenses;
   SetStations(workspace, &graph);
   GloballyMapped result;

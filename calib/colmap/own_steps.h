@@ -1,14 +1,13 @@
-// calib/colmap/own_steps.h -- the steps of structure from motion by calib/sfm, in a workspace and a
-// database that COLMAP's programs can go on with.
+// calib/colmap/own_steps.h -- the steps of structure from motion by calib/sfm, in a workspace.
 #pragma once
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "calib/colmap/features.h"
-#include "calib/colmap/matching.h"
+#include "calib/colmap/feature_plan.h"
 #include "calib/colmap/workspace.h"
+#include "calib/sfm/run/match_summary.h"
 #include "calib/sfm/view_graph.h"
 
 namespace dtr::colmap {
@@ -27,24 +26,30 @@ GroupLenses LensesOf(const Workspace& workspace, const std::vector<CameraGroup>&
 sfm::Features FeaturesOf(const std::filesystem::path& photo, const std::filesystem::path& mask_file,
                          int max_image_size_px, int max_features);
 
-/// Features of all photos into `database`, batch by batch: an interrupted step of the same
-/// fingerprint goes on after the last of them. Features that a process with a part has found are
-/// taken over. `part`: of kFeatures, those of a part of the photos into a database of its own, and
-/// PartDone; a later stage needs `database` and throws Error.
-void OwnFeatures(Workspace& workspace, const std::filesystem::path& database,
-                 const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
-                 const std::optional<SfmPart>& part);
+/// Among the inputs of the step "features": work that an earlier store holds begins again.
+inline constexpr char kStoreVersion[] = "\nstore 1";
 
-/// Matches of the features in `features` into the workspace's database, with the lenses that they
-/// determine. `known_lenses`: intrinsics are given and hold; else focal lengths and distortion are
-/// estimated. Of the pairs that `matching` names only those of `allowed`, where it is given. With
-/// options.part only that, and PartDone.
-void OwnMatches(Workspace& workspace, const std::filesystem::path& features,
-                const std::vector<CameraGroup>& groups, Matching matching,
+/// Features of all photos into the workspace's kFeatureFile (store.h), batch by batch: an
+/// interrupted step of the same fingerprint goes on after the last of them. Features that a process
+/// with a part has found are taken over. `part`: of kFeatures, those of a part of the photos into a
+/// file of its own, and PartDone; a later stage needs the file of all and throws Error.
+void OwnFeatures(Workspace& workspace, const std::vector<CameraGroup>& groups,
+                 const ExtractionPlan& plan, const std::optional<SfmPart>& part);
+
+/// Matches of these features into the workspace's kMatchFile, with the lenses that they determine.
+/// `known_lenses`: intrinsics are given and hold; else focal lengths and distortion are estimated.
+/// Of the pairs that `matching` names only those of `allowed`, where it is given. With options.part
+/// only that, and PartDone.
+void OwnMatches(Workspace& workspace, const std::vector<CameraGroup>& groups, Matching matching,
                 const SfmOptions& options, bool known_lenses,
                 const std::optional<ImagePairs>& allowed);
 
-/// What the global mapper made of the workspace's database, photos under their own names.
+/// The graph that OwnMatches left, images in the workspace's order under their own names. Throws
+/// Error where the store is damaged.
+sfm::ViewGraph ReadGraph(const Workspace& workspace);
+sfm::MatchSummary SummaryOf(const Workspace& workspace);
+
+/// What the global mapper made of the workspace's matches.
 struct GloballyMapped {
   calib::SfmModel model;  ///< without images: none could be placed
   /// Why the model must not be taken as it is: a clause; empty where it passes.

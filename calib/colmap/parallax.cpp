@@ -3,9 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
-
-#include "calib/colmap/database.h"
 
 namespace dtr::colmap {
 namespace {
@@ -15,35 +12,26 @@ namespace {
 // whose long side is 640 to 2400 px.
 constexpr double kStillShare = 0.003;
 
-// COLMAP's TwoViewGeometry::ConfigurationType.
-constexpr int kPlanar = 4, kWatermark = 7;
-
 bool HalfOrMore(int part, int whole) { return whole > 0 && 2 * part >= whole; }
 
 }  // namespace
 
-PairCounts CountPairs(const Workspace& workspace) {
-  const auto ids = ReadDatabaseIds(workspace.database());
-  std::map<std::uint32_t, double> long_side_px;
-  for (size_t i = 0; i < workspace.images().size(); ++i) {
-    const SfmImageInput& image = workspace.images()[i];
-    const auto found = ids.find(workspace.AliasOf(i));
-    if (found == ids.end()) continue;
-    long_side_px[found->second.image_id] = std::max(image.width_px, image.height_px);
-  }
+PairCounts CountPairs(const sfm::MatchSummary& matches) {
   PairCounts counts;
-  counts.photos = static_cast<int>(workspace.images().size());
-  ForEachMatchedPair(workspace.database(), [&](const MatchedPair& pair) {
-    const auto side = long_side_px.find(pair.image_ids[0]);
-    if (side == long_side_px.end()) return;
-    const double limit_px = kStillShare * side->second;
-    const auto still = std::count_if(pair.moved_px.begin(), pair.moved_px.end(),
-                                     [&](double px) { return px < limit_px; });
-    ++counts.matched;
-    counts.still += HalfOrMore(static_cast<int>(still), static_cast<int>(pair.moved_px.size()));
-    counts.without_parallax += pair.config >= kPlanar && pair.config <= kWatermark;
-  });
+  counts.photos = static_cast<int>(matches.features.size());
+  counts.matched = static_cast<int>(matches.pairs.size());
+  for (const sfm::MatchSummary::Pair& pair : matches.pairs) {
+    counts.still += pair.still;
+    counts.without_parallax += pair.one_homography;
+  }
   return counts;
+}
+
+bool AreStill(const std::vector<double>& moved_px, const SfmImageInput& photo) {
+  const double limit_px = kStillShare * std::max(photo.width_px, photo.height_px);
+  const auto still =
+      std::count_if(moved_px.begin(), moved_px.end(), [&](double px) { return px < limit_px; });
+  return HalfOrMore(static_cast<int>(still), static_cast<int>(moved_px.size()));
 }
 
 bool CameraStoodStill(const PairCounts& counts) { return HalfOrMore(counts.still, counts.matched); }

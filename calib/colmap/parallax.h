@@ -1,13 +1,14 @@
 // calib/colmap/parallax.h -- did the camera move against what the photos show? From their matches.
 #pragma once
-#include <optional>
 #include <string>
+#include <vector>
 
-#include "calib/colmap/workspace.h"
+#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/match_summary.h"
 
 namespace dtr::colmap {
 
-/// What the pairs of the workspace's database show.
+/// What the matched pairs show.
 struct PairCounts {
   int photos = 0;
   int matched = 0;  ///< pairs with features in common that agree with one geometry
@@ -19,8 +20,11 @@ struct PairCounts {
   int still = 0;
 };
 
-/// Throws Error where the database is none, or a record of it cannot be.
-PairCounts CountPairs(const Workspace& workspace);
+PairCounts CountPairs(const sfm::MatchSummary& matches);
+
+/// Of a pair of photos, of which `photo` is the first: half or more of the features moved so little
+/// that they lie at the same position.
+bool AreStill(const std::vector<double>& moved_px, const SfmImageInput& photo);
 
 /// Half of the matched pairs or more are `still`.
 bool CameraStoodStill(const PairCounts& counts);

@@ -74,7 +74,7 @@ std::string HowItEnded(const ProcessResult& result) {
 
 bool Program::IsInstalled() { return !FindProgram(kProgram).empty(); }
 
-Program::State Program::Find() {
+ColmapState Program::Find() {
   if (!IsInstalled()) return {};
   try {
     return {Program().version(), ""};
@@ -164,6 +164,13 @@ void RunColmap(const std::vector<std::string>& argv, StepRecord& record,
       result.Ok() ? "expected all of its results in its database" : HowItEnded(result);
   throw Error(fmt::format("colmap {} ({}): {}: {}; see {}", argv.at(1), record.name, ended,
                           cause.Cause(), record.log_file.string()));
+}
+
+void RunStep(Workspace& workspace, const Arguments& arguments,
+             const std::function<void(const std::string&)>& on_line) {
+  workspace.RunProgram([&](StepRecord& record) {
+    RunColmap(arguments.argv(), record, on_line, workspace.progress());
+  });
 }
 
 }  // namespace dtr::colmap

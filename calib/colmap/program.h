@@ -7,7 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "calib/colmap/sfm.h"
+#include "calib/colmap/colmap_steps.h"
+#include "calib/colmap/workspace.h"
 
 namespace dtr::colmap {
 
@@ -21,13 +22,7 @@ class Program {
 
   /// Whether there is a colmap on the PATH at all.
   static bool IsInstalled();
-  /// What there is, without a throw.
-  struct State {
-    std::string version;  ///< of one that works
-    std::string why_not;  ///< one line of one that does not; empty where there is none
-    bool Works() const { return !version.empty(); }
-  };
-  static State Find();
+  static ColmapState Find();
 
   const std::string& version() const { return version_; }
   /// Whether it was built with CUDA, by its own words.
@@ -67,5 +62,9 @@ class Arguments {
 /// step, cause and log, unless the program exits with 0.
 void RunColmap(const std::vector<std::string>& argv, StepRecord& record,
                const std::function<void(const std::string&)>& on_line, Progress& progress);
+
+/// The same inside a step of a workspace.
+void RunStep(Workspace& workspace, const Arguments& arguments,
+             const std::function<void(const std::string&)>& on_line);
 
 }  // namespace dtr::colmap

@@ -15,6 +15,8 @@
 
 namespace dtr::colmap {
 
+class ColmapSteps;  // colmap_steps.h
+
 /// A photo to be calibrated: `images_dir / name`, upright (EXIF orientation already applied).
 struct SfmImageInput {
   std::string name;
@@ -82,6 +84,7 @@ struct SfmPart {
 };
 
 struct SfmOptions {
+  const ColmapSteps* colmap = nullptr;  ///< needed with every engine: models have its format
   SfmEngine engine = SfmEngine::kAuto;
   Matching matching = Matching::kAuto;
   int threads = 0;            ///< 0: all cores

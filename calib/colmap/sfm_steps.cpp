@@ -5,18 +5,12 @@
 #include <algorithm>
 #include <set>
 
-#include "calib/colmap/database.h"
-#include "calib/colmap/matching.h"
+#include "calib/colmap/colmap_steps.h"
 #include "calib/colmap/own_steps.h"
-#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
-#include "dtr/base/files.h"
 
 namespace dtr::colmap {
-namespace fs = std::filesystem;
 namespace {
-
-constexpr std::uintmax_t kLargestStepNote = 1 << 12;
 
 // What the features depend on beside the photos.
 std::string TextOf(const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
@@ -42,6 +36,15 @@ calib::CameraModel CameraModelOf(const SfmOptions& options) {
   return *model;
 }
 
+std::string VersionOf(const SfmOptions& options) {
+  return options.engine == SfmEngine::kColmap ? options.colmap->Version() : kOwnVersion;
+}
+
+sfm::MatchSummary MatchedIn(const Workspace& workspace, const SfmOptions& options) {
+  return options.engine == SfmEngine::kColmap ? options.colmap->Matched(workspace)
+                                              : SummaryOf(workspace);
+}
+
 void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& groups,
                         const SfmOptions& options, SfmReport& report,
                         const std::optional<ImagePairs>& allowed, bool known_lenses) {
@@ -52,17 +55,16 @@ void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& gr
   report.max_image_size_px = plan.max_image_size_px;
   report.matching = ResolveMatching(options.matching, workspace.images().size());
 
-  const fs::path features = workspace.folder() / "features.db";
-  workspace.Step("features", TextOf(groups, plan, options.seed), [&] {
-    if (options.engine == SfmEngine::kColmap) {
-      ExtractFeaturesResumably(workspace, features, groups, plan, options.seed);
-    } else {
-      OwnFeatures(workspace, features, groups, plan, options.part);
-    }
+  const bool by_colmap = options.engine == SfmEngine::kColmap;
+  std::string inputs = TextOf(groups, plan, options.seed);
+  if (!by_colmap) inputs += kStoreVersion;
+  workspace.Step("features", inputs, [&] {
+    by_colmap ? options.colmap->Extract(workspace, groups, plan, options.seed)
+              : OwnFeatures(workspace, groups, plan, options.part);
   });
   if (options.part && options.part->stage == SfmStage::kFeatures) throw PartDone();
   auto text = fmt::format("matching {} seed {}", static_cast<int>(report.matching), options.seed);
-  if (known_lenses && options.engine != SfmEngine::kColmap) text += " known lenses";
+  if (known_lenses && !by_colmap) text += " known lenses";
   for (const SfmImageInput& image : workspace.images()) {
     if (!image.station.empty()) text += " " + image.station;
   }
@@ -70,29 +72,9 @@ void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& gr
     for (const auto& [a, b] : *allowed) text += fmt::format(" {}-{}", a, b);
   }
   workspace.Step("matches", text, [&] {
-    if (options.engine != SfmEngine::kColmap) {
-      OwnMatches(workspace, features, groups, report.matching, options, known_lenses, allowed);
-      return;
-    }
-    // Matching may take hours: an interrupted run of the same inputs goes on with its pairs.
-    const fs::path begun = workspace.folder() / "matches.begun";
-    const bool go_on = fs::exists(begun) && fs::exists(workspace.database()) &&
-                       ReadFile(begun, kLargestStepNote) == workspace.fingerprint();
-    if (!go_on) {
-      RemoveTree(begun);
-      CopyDatabase(features, workspace.database());
-      WriteFileAtomically(begun, workspace.fingerprint());
-    }
-    MatchPhotos(workspace, workspace.database(), report.matching, options.memory_gb, options.seed,
-                allowed);
+    by_colmap ? options.colmap->Match(workspace, report.matching, options, allowed)
+              : OwnMatches(workspace, groups, report.matching, options, known_lenses, allowed);
   });
-}
-
-void AllowForwardMotion(Arguments& arguments) {
-  arguments.AddIfKnown({"Mapper.init_max_forward_motion"}, "1")
-      .AddIfKnown({"Mapper.init_min_tri_angle"}, "2")
-      .AddIfKnown({"Mapper.filter_min_tri_angle"}, "0.5")
-      .AddIfKnown({"Mapper.abs_pose_min_num_inliers"}, std::to_string(kMinInliersForward));
 }
 
 void CompleteReport(const Workspace& workspace, const calib::SfmModel& model, SfmReport& report) {

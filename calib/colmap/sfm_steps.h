@@ -5,16 +5,23 @@
 #include <string>
 #include <vector>
 
-#include "calib/colmap/features.h"
-#include "calib/colmap/matching.h"
+#include "calib/colmap/feature_plan.h"
 #include "calib/colmap/workspace.h"
+#include "calib/sfm/run/match_summary.h"
 
 namespace dtr::colmap {
 
 /// The lens model of the options. Throws UsageError on an unknown name.
 calib::CameraModel CameraModelOf(const SfmOptions& options);
 
-/// Steps "features" and "matches": fills workspace.database(). What was planned goes to `report`.
+/// COLMAP's with kColmap, else kOwnVersion: the version of a workspace. Throws Error where COLMAP
+/// is needed and does not work.
+std::string VersionOf(const SfmOptions& options);
+
+/// What matching found, by whatever engine.
+sfm::MatchSummary MatchedIn(const Workspace& workspace, const SfmOptions& options);
+
+/// Steps "features" and "matches" of the workspace. What was planned goes to `report`.
 /// Of the pairs that options.matching names only those of `allowed` (a < b, sorted; numbers of
 /// images()) are matched, where it is given. `known_lenses`: the groups' parameters are given, not
 /// guesses.
@@ -24,12 +31,6 @@ void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& gr
 
 /// Fills in what every report has: runs, version, who did not register, the error; writes it.
 void CompleteReport(const Workspace& workspace, const calib::SfmModel& model, SfmReport& report);
-
-/// COLMAP starts from two photos that see the scene from 16 degrees apart, or 4 where it finds
-/// none, and not along the line of sight. A walk straight ahead through a street has no such pair.
-/// Its points are seen under small angles throughout, so they are kept under smaller ones, too, and
-/// fewer of them must agree with a pose. Adds, of what says so, the options that the command has.
-void AllowForwardMotion(Arguments& arguments);
 
 /// File in the workspace of a model that RunSfm needed them for: what is registered in it needs
 /// them, too.

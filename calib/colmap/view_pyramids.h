@@ -2,8 +2,8 @@
 #pragma once
 #include <span>
 
+#include "calib/colmap/feature_plan.h"
 #include "calib/colmap/known_poses.h"
-#include "calib/colmap/matching.h"
 
 namespace dtr::colmap {
 

@@ -4,8 +4,8 @@
 
 #include <cstdint>
 #include <set>
-
-#include "calib/colmap/database.h"
+#include <utility>
+#include <vector>
 
 namespace dtr::colmap {
 namespace {
@@ -56,34 +56,23 @@ std::string Reason(std::int64_t features, const InCommon& common, int min_common
 }  // namespace
 
 std::map<std::string, std::string> WhyWithoutCamera(const Workspace& workspace,
+                                                    const sfm::MatchSummary& matches,
                                                     const calib::SfmModel& model, int min_common) {
   std::set<std::string> registered;
   for (const calib::SfmImage& image : model.images) registered.insert(image.name);
-  std::map<std::string, std::string> reasons;
-  if (registered.size() == workspace.images().size()) return reasons;
-  const auto ids = ReadDatabaseIds(workspace.database());
-  const DatabaseMatches matches = ReadDatabaseMatches(workspace.database());
-  std::map<std::uint32_t, std::string> names;
-  for (size_t i = 0; i < workspace.images().size(); ++i) {
-    const auto found = ids.find(workspace.AliasOf(i));
-    if (found != ids.end()) names[found->second.image_id] = workspace.images()[i].name;
-  }
-  std::map<std::string, InCommon> in_common;
-  for (const DatabasePair& pair : matches.pairs) {
-    for (const int side : {0, 1}) {
-      const auto mine = names.find(pair.image_ids[side]);
-      const auto theirs = names.find(pair.image_ids[1 - side]);
-      if (mine == names.end() || theirs == names.end()) continue;
-      InCommon& known = in_common[mine->second];
-      (registered.contains(theirs->second) ? known.with_camera : known.without)
-          .Add(pair.common, theirs->second);
+  const auto& images = workspace.images();
+  std::vector<InCommon> in_common(images.size());
+  for (const sfm::MatchSummary::Pair& pair : matches.pairs) {
+    for (const auto& [mine, theirs] : {std::pair(pair.a, pair.b), std::pair(pair.b, pair.a)}) {
+      const std::string& name = images[theirs].name;
+      InCommon& known = in_common[mine];
+      (registered.contains(name) ? known.with_camera : known.without).Add(pair.common, name);
     }
   }
-  for (const auto& [id, name] : names) {
-    if (registered.contains(name)) continue;
-    const auto features = matches.features.find(id);
-    reasons[name] = Reason(features == matches.features.end() ? 0 : features->second,
-                           in_common[name], min_common);
+  std::map<std::string, std::string> reasons;
+  for (size_t i = 0; i < images.size(); ++i) {
+    if (registered.contains(images[i].name)) continue;
+    reasons[images[i].name] = Reason(matches.features[i], in_common[i], min_common);
   }
   return reasons;
 }

@@ -4,15 +4,16 @@
 #include <string>
 
 #include "calib/colmap/workspace.h"
+#include "calib/sfm/run/match_summary.h"
 
 namespace dtr::colmap {
 
-/// For every photo of the workspace's database that is not in the `model` a clause, by the photo's
+/// For every photo of the workspace that is not in the `model` a clause, by the photo's
 /// name, that says what it has in common with others: nothing at all, only with photos that have no
 /// camera either, or too little for COLMAP, which places a photo by `min_common` of its features
 /// that are points already (Mapper.abs_pose_min_num_inliers).
-/// Throws Error when the workspace's database is none.
 std::map<std::string, std::string> WhyWithoutCamera(const Workspace& workspace,
+                                                    const sfm::MatchSummary& matches,
                                                     const calib::SfmModel& model, int min_common);
 
 }  // namespace dtr::colmap

@@ -8,7 +8,6 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "calib/colmap/model_io.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
@@ -181,12 +180,12 @@ std::string Workspace::AliasFor(const std::string& prefix, size_t index, const s
 
 Workspace::Workspace(const fs::path& folder, const fs::path& images_dir,
                      std::span<const SfmImageInput> images, const std::string& alias_prefix,
-                     int threads, Progress& progress, SfmEngine engine, bool is_shared)
+                     int threads, Progress& progress, std::string version, bool is_shared)
     : folder_(fs::absolute(folder)),
       images_(images.begin(), images.end()),
       threads_(threads),
       progress_(progress),
-      engine_(engine) {
+      version_(std::move(version)) {
   std::sort(images_.begin(), images_.end(),
             [](const auto& a, const auto& b) { return a.name < b.name; });
   for (const char* part : {"images", "logs", "lists"}) MakeFolder(folder_ / part);
@@ -215,8 +214,7 @@ Workspace::Workspace(const fs::path& folder, const fs::path& images_dir,
     WriteFileAtomically(folder_ / "images.json", names.dump(kIndent, ' ', false, replace) + "\n");
     hashes.Write();
   }
-  if (engine_ == SfmEngine::kColmap) program();
-  fingerprint_ = HashOfText(version() + identity.dump(-1, ' ', false, replace));
+  fingerprint_ = HashOfText(version_ + identity.dump(-1, ' ', false, replace));
 }
 
 // Touches nothing where all is as it should be.
@@ -243,10 +241,6 @@ void Workspace::LinkPhotos(const fs::path& images_dir) const {
   }
 }
 
-std::string Workspace::version() const {
-  return engine_ == SfmEngine::kColmap ? program_->version() : kOwnVersion;
-}
-
 const std::string& Workspace::NameOfAlias(const std::string& alias) const {
   const auto found = std::find(aliases_.begin(), aliases_.end(), alias);
   if (found == aliases_.end()) {
@@ -254,30 +248,6 @@ const std::string& Workspace::NameOfAlias(const std::string& alias) const {
                             folder_.string(), alias));
   }
   return images_[static_cast<size_t>(found - aliases_.begin())].name;
-}
-
-Program& Workspace::program() {
-  if (!program_) program_.emplace();
-  return *program_;
-}
-
-calib::SfmModel Workspace::ReadModelHere(const fs::path& folder) const {
-  calib::SfmModel model = ReadModel(folder);
-  for (calib::SfmImage& image : model.images) image.name = NameOfAlias(image.name);
-  return model;  // aliases sort as the names do
-}
-
-void Workspace::WriteModelHere(const fs::path& folder, calib::SfmModel model) const {
-  for (calib::SfmImage& image : model.images) {
-    const auto known = std::lower_bound(images_.begin(), images_.end(), image.name,
-                                        [](const auto& a, const auto& b) { return a.name < b; });
-    if (known == images_.end() || known->name != image.name) {
-      throw Error(fmt::format("{}: expected images of this workspace only, found '{}'",
-                              folder.string(), image.name));
-    }
-    image.name = aliases_[static_cast<size_t>(known - images_.begin())];
-  }
-  WriteModel(folder, model, Format::kBinary);
 }
 
 void Workspace::Step(const std::string& name, const std::string& inputs,
@@ -299,7 +269,7 @@ void Workspace::Step(const std::string& name, const std::string& inputs,
     ThrowFullDisk(folder_, error.what());
     throw;
   }
-  SyncTree(folder_);  // the stamp vouches for what COLMAP wrote, which syncs nothing
+  SyncTree(folder_);  // the stamp vouches for what other programs wrote, which sync nothing
   WriteStamp(stamp, fingerprint_, std::span(records_).subspan(first_of_step_), {});
 }
 
@@ -315,13 +285,12 @@ std::optional<size_t> Workspace::Kept(const fs::path& note) {
   return kept->done;
 }
 
-void Workspace::Run(const Arguments& arguments,
-                    const std::function<void(const std::string&)>& on_line) {
+void Workspace::RunProgram(const std::function<void(StepRecord&)>& run) {
   StepRecord& record = records_.emplace_back();
   record.name = step_;
   record.log_file = folder_ / "logs" / fmt::format("{:02}-{}.log", records_.size(), step_);
   try {
-    RunColmap(arguments.argv(), record, on_line, progress_);
+    run(record);
   } catch (...) {
     WriteReport(folder_, Report());  // what failed, and how, stays beside its log
     throw;
@@ -350,7 +319,7 @@ fs::path Workspace::WriteList(const std::string& name, const std::vector<std::st
 
 SfmReport Workspace::Report() const {
   SfmReport report;
-  report.version = version();
+  report.version = version_;
   report.steps = records_;
   return report;
 }

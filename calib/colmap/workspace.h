@@ -1,5 +1,5 @@
-// calib/colmap/workspace.h -- the folder in which COLMAP works: photos, steps, checkpoints,
-// records.
+// calib/colmap/workspace.h -- the folder in which structure from motion works: photos, steps,
+// checkpoints, records.
 #pragma once
 #include <filesystem>
 #include <functional>
@@ -8,37 +8,32 @@
 #include <string>
 #include <vector>
 
-#include "calib/colmap/program.h"
 #include "calib/colmap/sfm.h"
 
 namespace dtr::colmap {
 
 /// Layout: images/ (links under plain names, see AliasOf), images.json (which link is which photo),
 /// hashes.json (of the photos, by size and time),
-/// logs/, lists/, STEP.done.json (stamps), database.db, and what the steps leave.
+/// logs/, lists/, STEP.done.json (stamps), and what the steps leave.
 class Workspace {
  public:
   /// Sorts `images` by name (byte order), checks that all are there, links them.
-  /// `alias_prefix` keeps photos of two workspaces apart that meet in one database. With the engine
-  /// kColmap its version is part of every step's inputs; with others COLMAP may be missing.
+  /// `alias_prefix` keeps photos of two workspaces apart that meet in one database. The `version`,
+  /// of what finds features and matches, is part of every step's inputs.
   /// `is_shared`: see SfmOptions::folder_is_shared.
   /// Throws UsageError on duplicate names or sizes that cannot be, Error on files that are absent
   /// or cannot be linked.
   Workspace(const std::filesystem::path& folder, const std::filesystem::path& images_dir,
             std::span<const SfmImageInput> images, const std::string& alias_prefix, int threads,
-            Progress& progress, SfmEngine engine = SfmEngine::kColmap, bool is_shared = false);
+            Progress& progress, std::string version, bool is_shared = false);
 
   const std::filesystem::path& folder() const { return folder_; }
   std::filesystem::path images_folder() const { return folder_ / "images"; }
   std::filesystem::path masks_folder() const { return folder_ / "masks"; }
-  std::filesystem::path database() const { return folder_ / "database.db"; }
   const std::vector<SfmImageInput>& images() const { return images_; }
   std::filesystem::path FileOf(size_t image) const { return images_folder() / AliasOf(image); }
-  /// COLMAP, asked for when first needed. Throws Error where it is missing.
-  Program& program();
   Progress& progress() { return progress_; }
-  /// Of what finds features and matches here: COLMAP's, or kOwnVersion.
-  std::string version() const;
+  const std::string& version() const { return version_; }
   int threads() const { return threads_; }
 
   /// Name under which COLMAP knows images()[image]. COLMAP's lists separate names by blanks and
@@ -50,13 +45,8 @@ class Workspace {
   /// The photo's own name. Throws Error where no photo here has this alias.
   const std::string& NameOfAlias(const std::string& alias) const;
 
-  /// Reads a model COLMAP made here and gives the images their own names back.
-  calib::SfmModel ReadModelHere(const std::filesystem::path& folder) const;
-  /// The inverse: writes a model for COLMAP to read. Every image must be one of images().
-  void WriteModelHere(const std::filesystem::path& folder, calib::SfmModel model) const;
-
   /// Runs `body` unless an earlier call finished the step `name` on the same inputs: photos (names,
-  /// sizes, contents), COLMAP's version, all steps before, and `inputs` (options, as text).
+  /// sizes, contents), version, all steps before, and `inputs` (options, as text).
   void Step(const std::string& name, const std::string& inputs, const std::function<void()>& body);
 
   /// Identity of the step running now (or last begun): hash of everything it depends on.
@@ -68,8 +58,9 @@ class Workspace {
   void Keep(const std::filesystem::path& note, size_t done) const;
   std::optional<size_t> Kept(const std::filesystem::path& note);
 
-  /// Runs COLMAP once inside a step; see RunColmap.
-  void Run(const Arguments& arguments, const std::function<void(const std::string&)>& on_line);
+  /// Runs another program once inside a step: `run` fills in what the record lacks, also where it
+  /// throws.
+  void RunProgram(const std::function<void(StepRecord&)>& run);
 
   /// Runs `body`, work of this program, inside a step, and records what it cost.
   void RunHere(const std::function<void()>& body);
@@ -88,8 +79,7 @@ class Workspace {
   std::vector<std::string> aliases_;
   int threads_;
   Progress& progress_;
-  SfmEngine engine_;
-  std::optional<Program> program_;
+  std::string version_;
   std::string fingerprint_;
   std::string step_;
   size_t first_of_step_ = 0;  // among records_

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "calib/bundle/held_out.h"
-#include "calib/colmap/matching.h"
+#include "calib/colmap/feature_plan.h"
 #include "calib/colmap/pairs.h"
 #include "calib/colmap/program.h"
 #include "calib/reference_tracks/score.h"
@@ -172,7 +172,7 @@ eval::SweepMeasurement CalibrationSweep::Measure(const eval::SweepSetting& setti
 
 std::string CalibrationSweep::Identity() const {
   std::string identity = InputHash(options_.photos) + " " + colmap::kOwnVersion;
-  const colmap::Program::State program = colmap::Program::Find();
+  const colmap::ColmapState program = colmap::Program::Find();
   if (program.Works()) identity += " " + program.version;
   return identity;
 }

@@ -12,6 +12,7 @@
 #include "calib/colmap/export.h"
 #include "calib/colmap/held_out.h"
 #include "calib/colmap/model_io.h"
+#include "calib/colmap/steps.h"
 #include "calib/colmap/view_pyramids.h"
 #include "calib/colmap/workspace.h"
 #include "dtr/base/error.h"
@@ -33,7 +34,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::SizeIs;
 
-const SfmOptions kByColmap{.engine = SfmEngine::kColmap};
+const SfmOptions kByColmap{.colmap = &Steps(), .engine = SfmEngine::kColmap};
 
 // Three photos that only a fake COLMAP will open, of two cameras.
 class KnownPosesWithFake : public ::testing::Test {

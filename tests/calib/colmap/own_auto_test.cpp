@@ -9,6 +9,7 @@
 
 #include "calib/colmap/model_io.h"
 #include "calib/colmap/sfm.h"
+#include "calib/colmap/steps.h"
 #include "calib/colmap/workspace.h"
 #include "datasets/hard/hard_sets.h"
 #include "dtr/base/error.h"
@@ -75,6 +76,7 @@ void WriteQuilt(const std::array<fs::path, 4>& photos, const fs::path& file) {
 class AutoSfm : public ::testing::Test {
  protected:
   AutoSfm() : truth_(PlazaTruth()) {
+    options_.colmap = &Steps();
     options_.engine = SfmEngine::kAuto;
     options_.max_image_size_px = kSmallSidePx;
     options_.lens_model = "SIMPLE_PINHOLE";

@@ -7,6 +7,7 @@
 
 #include "calib/colmap/held_out.h"
 #include "calib/colmap/sfm.h"
+#include "calib/colmap/steps.h"
 #include "dtr/io/image_io.h"
 #include "tests/calib/colmap/model_test_support.h"
 #include "tests/calib/colmap/plaza_truth.h"
@@ -25,6 +26,7 @@ using ::testing::IsEmpty;
 class OwnSfm : public ::testing::Test {
  protected:
   OwnSfm() : truth_(PlazaTruth()) {
+    options_.colmap = &Steps();
     options_.engine = SfmEngine::kGlobal;
     options_.max_image_size_px = kSidePx;
     options_.lens_model = "SIMPLE_PINHOLE";

@@ -6,6 +6,7 @@
 #include "calib/colmap/known_poses.h"
 #include "calib/colmap/model_io.h"
 #include "calib/colmap/sfm.h"
+#include "calib/colmap/steps.h"
 #include "dtr/base/process.h"
 #include "tests/calib/colmap/model_test_support.h"
 #include "tests/calib/colmap/plaza_truth.h"
@@ -25,6 +26,7 @@ class RealColmap : public ::testing::Test {
   void SetUp() override {
     if (FindProgram("colmap").empty()) GTEST_SKIP() << "there is no colmap on the PATH";
     truth_ = PlazaTruth();
+    options_.colmap = &Steps();
     options_.engine = SfmEngine::kColmap;
     options_.max_image_size_px = kSidePx;
     options_.lens_model = "SIMPLE_PINHOLE";

@@ -11,6 +11,7 @@
 
 #include "calib/colmap/model_io.h"
 #include "calib/colmap/sfm.h"
+#include "calib/colmap/steps.h"
 #include "calib/colmap/workspace.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -45,6 +46,7 @@ class RunSfmWithFake : public ::testing::Test {
       WriteFileAtomically(photos_ / name, std::string("photo ") + name);
       images_.push_back({name, 640, 480, 500.0, "camera one"});
     }
+    options_.colmap = &Steps();
     options_.engine = SfmEngine::kColmap;
     options_.threads = 2;
     fake_.LeaveDatabase(Aliases());

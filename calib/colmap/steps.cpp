@@ -1,0 +1,126 @@
+#include "calib/colmap/steps.h"
+
+#include <map>
+
+#include "calib/colmap/database.h"
+#include "calib/colmap/features.h"
+#include "calib/colmap/graph_database.h"
+#include "calib/colmap/mapper.h"
+#include "calib/colmap/matching.h"
+#include "calib/colmap/model_io.h"
+#include "calib/colmap/own_steps.h"
+#include "calib/colmap/parallax.h"
+#include "calib/colmap/placement.h"
+#include "calib/colmap/program.h"
+#include "calib/colmap/workspace_files.h"
+#include "dtr/base/delete.h"
+#include "dtr/base/files.h"
+
+namespace dtr::colmap {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr std::uintmax_t kLargestStepNote = 1 << 12;
+
+// Of TwoViewGeometry::ConfigurationType: one homography explains these.
+constexpr int kFirstPlanar = 4, kLastPlanar = 7;
+
+fs::path FeatureDatabaseOf(const Workspace& workspace) { return workspace.folder() / "features.db"; }
+
+class ProgramSteps final : public ColmapSteps {
+ public:
+  ColmapState Find() const override { return Program::Find(); }
+  std::string Version() const override { return Program().version(); }
+  calib::SfmModel ReadModel(const fs::path& folder) const override {
+    return colmap::ReadModel(folder);
+  }
+  void WriteModel(const fs::path& folder, const calib::SfmModel& model) const override {
+    colmap::WriteModel(folder, model, Format::kBinary);
+  }
+
+  void Extract(Workspace& workspace, const std::vector<CameraGroup>& groups,
+               const ExtractionPlan& plan, std::uint64_t seed) const override {
+    Program program;
+    ExtractFeaturesResumably(program, workspace, FeatureDatabaseOf(workspace), groups, plan, seed);
+  }
+
+  void Match(Workspace& workspace, Matching matching, const SfmOptions& options,
+             const std::optional<ImagePairs>& allowed) const override {
+    Program program;
+    const fs::path database = DatabaseOf(workspace);
+    // Matching may take hours: an interrupted run of the same inputs goes on with its pairs.
+    const fs::path begun = workspace.folder() / "matches.begun";
+    const bool go_on = fs::exists(begun) && fs::exists(database) &&
+                       ReadFile(begun, kLargestStepNote) == workspace.fingerprint();
+    if (!go_on) {
+      RemoveTree(begun);
+      CopyDatabase(FeatureDatabaseOf(workspace), database);
+      WriteFileAtomically(begun, workspace.fingerprint());
+    }
+    MatchPhotos(program, workspace, database, matching, options.memory_gb, options.seed, allowed);
+  }
+
+  sfm::MatchSummary Matched(const Workspace& workspace) const override {
+    const fs::path database = DatabaseOf(workspace);
+    const auto ids = ReadDatabaseIds(database);
+    std::map<std::uint32_t, size_t> photo_of;
+    for (size_t i = 0; i < workspace.images().size(); ++i) {
+      const auto found = ids.find(workspace.AliasOf(i));
+      if (found != ids.end()) photo_of[found->second.image_id] = i;
+    }
+    sfm::MatchSummary summary;
+    summary.features.resize(workspace.images().size());
+    for (const auto& [id, features] : ReadDatabaseMatches(database).features) {
+      const auto photo = photo_of.find(id);
+      if (photo != photo_of.end()) summary.features[photo->second] = features;
+    }
+    ForEachMatchedPair(database, [&](const MatchedPair& pair) {
+      const auto a = photo_of.find(pair.image_ids[0]), b = photo_of.find(pair.image_ids[1]);
+      if (a == photo_of.end() || b == photo_of.end()) return;
+      summary.pairs.push_back({a->second, b->second,
+                               static_cast<std::int64_t>(pair.moved_px.size()),
+                               pair.config >= kFirstPlanar && pair.config <= kLastPlanar,
+                               AreStill(pair.moved_px, workspace.images()[a->second])});
+    });
+    return summary;
+  }
+
+  std::vector<calib::SfmModel> Map(Workspace& workspace, const std::vector<CameraGroup>& groups,
+                                   const SfmOptions& options) const override {
+    if (options.engine == SfmEngine::kColmap) return MapByColmap(workspace, groups, options);
+    const fs::path database = DatabaseOf(workspace);
+    sfm::ViewGraph graph = ReadGraph(workspace);
+    for (size_t i = 0; i < graph.images.size(); ++i) graph.images[i].name = workspace.AliasOf(i);
+    WriteGraphDatabase(database, graph, sfm::FeatureFile(workspace.folder() / sfm::kFeatureFile));
+    try {
+      auto models = MapByColmap(workspace, groups, options);
+      RemoveDatabase(database);
+      return models;
+    } catch (...) {
+      RemoveDatabase(database);
+      throw;
+    }
+  }
+  std::optional<calib::SfmModel> MapFixed(Workspace& workspace,
+                                          const SfmOptions& options) const override {
+    return MapFixedByColmap(workspace, options);
+  }
+  calib::SfmModel Triangulate(Workspace& workspace, const calib::SfmModel& posed,
+                              const SfmOptions& options) const override {
+    return TriangulateByColmap(workspace, posed, options);
+  }
+  void Register(Workspace& workspace, const RegistrationInput& input,
+                const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
+                const SfmOptions& options, const fs::path& registered) const override {
+    RegisterByColmap(workspace, input, groups, plan, options, registered);
+  }
+};
+
+}  // namespace
+
+const ColmapSteps& Steps() {
+  static const ProgramSteps steps;
+  return steps;
+}
+
+}  // namespace dtr::colmap

@@ -1,0 +1,10 @@
+// calib/colmap/steps.h -- COLMAP for structure from motion.
+#pragma once
+#include "calib/colmap/colmap_steps.h"
+
+namespace dtr::colmap {
+
+/// By the `colmap` on the PATH.
+const ColmapSteps& Steps();
+
+}  // namespace dtr::colmap
