@@ -6,10 +6,10 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "calib/colmap/feature_plan.h"
+#include "calib/sfm/run/feature_plan.h"
 #include "calib/colmap/model_io.h"
 #include "calib/colmap/program.h"
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 #include "calib/colmap/steps.h"
 #include "calib/models/fisheye.h"
 #include "capture/contents_json.h"

@@ -2,7 +2,7 @@
 #pragma once
 #include <string>
 
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 
 namespace dtr::pipeline {
 

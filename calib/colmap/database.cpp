@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "calib/colmap/sqlite_file.h"
-#include "calib/colmap/workspace.h"
+#include "calib/sfm/run/workspace.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 #include "calib/sfm_model.h"
 #include "dtr/base/progress.h"
 #include "dtr/types/camera.h"

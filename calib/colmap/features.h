@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <vector>
 
-#include "calib/colmap/feature_plan.h"
+#include "calib/sfm/run/feature_plan.h"
 #include "calib/colmap/program.h"
-#include "calib/colmap/workspace.h"
+#include "calib/sfm/run/workspace.h"
 
 namespace dtr::colmap {
 

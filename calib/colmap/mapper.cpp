@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "calib/colmap/sfm_steps.h"
+#include "calib/sfm/run/sfm_steps.h"
 #include "calib/colmap/workspace_files.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/error.h"

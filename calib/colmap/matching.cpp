@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "calib/colmap/pairs.h"
+#include "calib/sfm/run/pairs.h"
 
 namespace dtr::colmap {
 namespace {

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "calib/colmap/feature_plan.h"
+#include "calib/sfm/run/feature_plan.h"
 #include "calib/colmap/program.h"
 
 namespace dtr::colmap {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "calib/colmap/colmap_steps.h"
-#include "calib/colmap/workspace.h"
+#include "calib/sfm/run/colmap_steps.h"
+#include "calib/sfm/run/workspace.h"
 
 namespace dtr::colmap {
 

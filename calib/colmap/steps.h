@@ -1,6 +1,6 @@
 // calib/colmap/steps.h -- COLMAP for structure from motion.
 #pragma once
-#include "calib/colmap/colmap_steps.h"
+#include "calib/sfm/run/colmap_steps.h"
 
 namespace dtr::colmap {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "calib/colmap/database.h"
-#include "calib/colmap/known_poses.h"
+#include "calib/sfm/run/known_poses.h"
 #include "calib/colmap/placement.h"
 #include "calib/colmap/workspace_files.h"
 #include "dtr/base/delete.h"

@@ -2,7 +2,7 @@
 #pragma once
 #include <filesystem>
 
-#include "calib/colmap/workspace.h"
+#include "calib/sfm/run/workspace.h"
 #include "calib/sfm_model.h"
 
 namespace dtr::colmap {

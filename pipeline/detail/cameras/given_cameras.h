@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "calib/bundle/refine.h"
-#include "calib/colmap/known_poses.h"
+#include "calib/sfm/run/known_poses.h"
 #include "calib/validation/conventions.h"
 #include "dtr/base/progress.h"
 #include "dtr/types/check.h"

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <map>
 
-#include "calib/colmap/held_out.h"
-#include "calib/colmap/known_poses.h"
+#include "calib/sfm/run/held_out.h"
+#include "calib/sfm/run/known_poses.h"
 #include "calib/colmap/model_io.h"
 #include "capture/sfm_images.h"
 #include "dtr/base/error.h"

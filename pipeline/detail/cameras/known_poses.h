@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 #include "dtr/io/formats/cameras_json.h"
 #include "pipeline/calibrate.h"
 #include "pipeline/detail/photos/camera_groups.h"

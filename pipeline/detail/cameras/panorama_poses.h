@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 #include "capture/photo.h"
 #include "pipeline/set_rig.h"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 #include "pipeline/detail/cameras/photo_refinement.h"
 #include "pipeline/detail/photos/camera_groups.h"
 

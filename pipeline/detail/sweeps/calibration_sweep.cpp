@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "calib/bundle/held_out.h"
-#include "calib/colmap/feature_plan.h"
-#include "calib/colmap/pairs.h"
+#include "calib/sfm/run/feature_plan.h"
+#include "calib/sfm/run/pairs.h"
 #include "calib/colmap/program.h"
 #include "calib/reference_tracks/score.h"
 #include "capture/duplicates.h"

@@ -1,4 +1,4 @@
-#include "calib/colmap/known_poses.h"
+#include "calib/sfm/run/known_poses.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -10,11 +10,11 @@
 #include <numbers>
 
 #include "calib/colmap/export.h"
-#include "calib/colmap/held_out.h"
+#include "calib/sfm/run/held_out.h"
 #include "calib/colmap/model_io.h"
 #include "calib/colmap/steps.h"
-#include "calib/colmap/view_pyramids.h"
-#include "calib/colmap/workspace.h"
+#include "calib/sfm/run/view_pyramids.h"
+#include "calib/sfm/run/workspace.h"
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/random.h"

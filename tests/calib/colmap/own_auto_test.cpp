@@ -8,9 +8,9 @@
 #include <random>
 
 #include "calib/colmap/model_io.h"
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 #include "calib/colmap/steps.h"
-#include "calib/colmap/workspace.h"
+#include "calib/sfm/run/workspace.h"
 #include "datasets/hard/hard_sets.h"
 #include "dtr/base/error.h"
 #include "dtr/io/formats/cameras_json.h"

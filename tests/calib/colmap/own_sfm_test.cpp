@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <random>
 
-#include "calib/colmap/held_out.h"
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/held_out.h"
+#include "calib/sfm/run/sfm.h"
 #include "calib/colmap/steps.h"
 #include "dtr/io/image_io.h"
 #include "tests/calib/colmap/model_test_support.h"

@@ -1,4 +1,4 @@
-#include "calib/colmap/pairs.h"
+#include "calib/sfm/run/pairs.h"
 
 #include <gtest/gtest.h>
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "calib/colmap/export.h"
-#include "calib/colmap/known_poses.h"
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/known_poses.h"
+#include "calib/sfm/run/sfm.h"
 
 namespace dtr::colmap::testing {
 

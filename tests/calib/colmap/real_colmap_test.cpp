@@ -2,10 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "calib/colmap/held_out.h"
-#include "calib/colmap/known_poses.h"
+#include "calib/sfm/run/held_out.h"
+#include "calib/sfm/run/known_poses.h"
 #include "calib/colmap/model_io.h"
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 #include "calib/colmap/steps.h"
 #include "dtr/base/process.h"
 #include "tests/calib/colmap/model_test_support.h"

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "calib/colmap/model_io.h"
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 #include "calib/colmap/steps.h"
-#include "calib/colmap/workspace.h"
+#include "calib/sfm/run/workspace.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "tests/calib/colmap/fake_colmap.h"

@@ -1,4 +1,4 @@
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -8,10 +8,10 @@
 #include <mutex>
 
 #include "calib/colmap/features.h"
-#include "calib/colmap/held_out.h"
+#include "calib/sfm/run/held_out.h"
 #include "calib/colmap/matching.h"
 #include "calib/colmap/model_io.h"
-#include "calib/colmap/workspace.h"
+#include "calib/sfm/run/workspace.h"
 #include "dtr/base/error.h"
 #include "dtr/io/image_io.h"
 #include "tests/calib/colmap/fake_colmap.h"

@@ -1,4 +1,4 @@
-#include "calib/colmap/feature_parts.h"
+#include "calib/sfm/run/feature_parts.h"
 
 #include <fmt/format.h>
 

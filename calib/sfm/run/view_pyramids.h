@@ -1,9 +1,9 @@
-// calib/colmap/view_pyramids.h -- which photos with known cameras can show the same thing at all.
+// calib/sfm/run/view_pyramids.h -- which photos with known cameras can show the same thing at all.
 #pragma once
 #include <span>
 
-#include "calib/colmap/feature_plan.h"
-#include "calib/colmap/known_poses.h"
+#include "calib/sfm/run/feature_plan.h"
+#include "calib/sfm/run/known_poses.h"
 
 namespace dtr::colmap {
 

@@ -1,9 +1,9 @@
-// calib/colmap/without_camera.h -- why a photo found no camera, as far as its matches tell.
+// calib/sfm/run/without_camera.h -- why a photo found no camera, as far as its matches tell.
 #pragma once
 #include <map>
 #include <string>
 
-#include "calib/colmap/workspace.h"
+#include "calib/sfm/run/workspace.h"
 #include "calib/sfm/run/match_summary.h"
 
 namespace dtr::colmap {

@@ -1,12 +1,12 @@
-// calib/colmap/colmap_steps.h -- what the `colmap` program does of structure from motion.
+// calib/sfm/run/colmap_steps.h -- what the `colmap` program does of structure from motion.
 #pragma once
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "calib/colmap/feature_plan.h"
-#include "calib/colmap/workspace.h"
+#include "calib/sfm/run/feature_plan.h"
+#include "calib/sfm/run/workspace.h"
 #include "calib/sfm/run/match_summary.h"
 #include "calib/sfm_model.h"
 

@@ -1,12 +1,12 @@
-// calib/colmap/sfm_steps.h -- the steps that structure from motion and triangulation share.
+// calib/sfm/run/sfm_steps.h -- the steps that structure from motion and triangulation share.
 #pragma once
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "calib/colmap/feature_plan.h"
-#include "calib/colmap/workspace.h"
+#include "calib/sfm/run/feature_plan.h"
+#include "calib/sfm/run/workspace.h"
 #include "calib/sfm/run/match_summary.h"
 
 namespace dtr::colmap {

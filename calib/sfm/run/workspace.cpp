@@ -1,4 +1,4 @@
-#include "calib/colmap/workspace.h"
+#include "calib/sfm/run/workspace.h"
 
 #include <fmt/format.h>
 

@@ -1,17 +1,17 @@
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cstdio>
 
-#include "calib/colmap/colmap_steps.h"
-#include "calib/colmap/own_mapping.h"
-#include "calib/colmap/own_steps.h"
-#include "calib/colmap/parallax.h"
-#include "calib/colmap/point_colours.h"
-#include "calib/colmap/sfm_steps.h"
-#include "calib/colmap/without_camera.h"
+#include "calib/sfm/run/colmap_steps.h"
+#include "calib/sfm/run/own_mapping.h"
+#include "calib/sfm/run/own_steps.h"
+#include "calib/sfm/run/parallax.h"
+#include "calib/sfm/run/point_colours.h"
+#include "calib/sfm/run/sfm_steps.h"
+#include "calib/sfm/run/without_camera.h"
 #include "calib/sfm/mapping/model_check.h"
 #include "calib/sfm/mapping/triangulate.h"
 #include "dtr/base/delete.h"

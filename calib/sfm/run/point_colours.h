@@ -1,6 +1,6 @@
-// calib/colmap/point_colours.h -- the colours of a model's points.
+// calib/sfm/run/point_colours.h -- the colours of a model's points.
 #pragma once
-#include "calib/colmap/workspace.h"
+#include "calib/sfm/run/workspace.h"
 
 namespace dtr::colmap {
 

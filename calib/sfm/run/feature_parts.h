@@ -1,10 +1,10 @@
-// calib/colmap/feature_parts.h -- features that several processes found, each in a file of its own.
+// calib/sfm/run/feature_parts.h -- features that several processes found, each in a file of its own.
 #pragma once
 #include <filesystem>
 #include <optional>
 #include <vector>
 
-#include "calib/colmap/workspace.h"
+#include "calib/sfm/run/workspace.h"
 #include "calib/sfm/run/store.h"
 #include "dtr/base/part.h"
 

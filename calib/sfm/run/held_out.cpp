@@ -1,4 +1,4 @@
-#include "calib/colmap/held_out.h"
+#include "calib/sfm/run/held_out.h"
 
 #include <fmt/format.h>
 
@@ -7,10 +7,10 @@
 #include <mutex>
 #include <optional>
 
-#include "calib/colmap/colmap_steps.h"
-#include "calib/colmap/own_steps.h"
-#include "calib/colmap/pairs.h"
-#include "calib/colmap/sfm_steps.h"
+#include "calib/sfm/run/colmap_steps.h"
+#include "calib/sfm/run/own_steps.h"
+#include "calib/sfm/run/pairs.h"
+#include "calib/sfm/run/sfm_steps.h"
 #include "calib/lens_groups.h"
 #include "calib/sfm/registration/register_view.h"
 #include "calib/sfm/run/store.h"

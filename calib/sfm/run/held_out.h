@@ -1,4 +1,4 @@
-// calib/colmap/held_out.h -- poses of photos that took no part in structure from motion.
+// calib/sfm/run/held_out.h -- poses of photos that took no part in structure from motion.
 #pragma once
 #include <filesystem>
 #include <map>
@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 
 namespace dtr::colmap {
 

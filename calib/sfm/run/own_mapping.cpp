@@ -1,4 +1,4 @@
-#include "calib/colmap/own_mapping.h"
+#include "calib/sfm/run/own_mapping.h"
 
 #include <fmt/format.h>
 
@@ -10,10 +10,10 @@
 #include "calib/bundle/bundle.h"
 #include "calib/bundle/degeneracy.h"
 #include "calib/bundle/refine.h"
-#include "calib/colmap/colmap_steps.h"
-#include "calib/colmap/own_steps.h"
-#include "calib/colmap/parallax.h"
-#include "calib/colmap/sfm_steps.h"
+#include "calib/sfm/run/colmap_steps.h"
+#include "calib/sfm/run/own_steps.h"
+#include "calib/sfm/run/parallax.h"
+#include "calib/sfm/run/sfm_steps.h"
 #include "calib/sfm/mapping/model_check.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/error.h"

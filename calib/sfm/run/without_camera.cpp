@@ -1,4 +1,4 @@
-#include "calib/colmap/without_camera.h"
+#include "calib/sfm/run/without_camera.h"
 
 #include <fmt/format.h>
 

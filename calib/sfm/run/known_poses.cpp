@@ -1,14 +1,14 @@
-#include "calib/colmap/known_poses.h"
+#include "calib/sfm/run/known_poses.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "calib/colmap/colmap_steps.h"
-#include "calib/colmap/own_steps.h"
-#include "calib/colmap/point_colours.h"
-#include "calib/colmap/sfm_steps.h"
-#include "calib/colmap/view_pyramids.h"
+#include "calib/sfm/run/colmap_steps.h"
+#include "calib/sfm/run/own_steps.h"
+#include "calib/sfm/run/point_colours.h"
+#include "calib/sfm/run/sfm_steps.h"
+#include "calib/sfm/run/view_pyramids.h"
 #include "calib/sfm/mapping/triangulate.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/error.h"

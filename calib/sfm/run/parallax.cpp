@@ -1,4 +1,4 @@
-#include "calib/colmap/parallax.h"
+#include "calib/sfm/run/parallax.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "calib/colmap/view_pyramids.h"
+#include "calib/sfm/run/view_pyramids.h"
 
 #include <Eigen/Dense>
 #include <algorithm>

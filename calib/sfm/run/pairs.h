@@ -1,4 +1,4 @@
-// calib/colmap/pairs.h -- which photos resemble each other, seen on small images.
+// calib/sfm/run/pairs.h -- which photos resemble each other, seen on small images.
 #pragma once
 #include <Eigen/Core>
 #include <filesystem>

@@ -1,4 +1,4 @@
-// calib/colmap/feature_plan.h -- feature extraction within a memory limit, camera by camera.
+// calib/sfm/run/feature_plan.h -- feature extraction within a memory limit, camera by camera.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 #include "calib/lens_camera.h"
 
 namespace dtr::colmap {

@@ -1,12 +1,12 @@
-// calib/colmap/own_steps.h -- the steps of structure from motion by calib/sfm, in a workspace.
+// calib/sfm/run/own_steps.h -- the steps of structure from motion by calib/sfm, in a workspace.
 #pragma once
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "calib/colmap/feature_plan.h"
-#include "calib/colmap/workspace.h"
+#include "calib/sfm/run/feature_plan.h"
+#include "calib/sfm/run/workspace.h"
 #include "calib/sfm/run/match_summary.h"
 #include "calib/sfm/view_graph.h"
 

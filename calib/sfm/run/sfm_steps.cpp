@@ -1,12 +1,12 @@
-#include "calib/colmap/sfm_steps.h"
+#include "calib/sfm/run/sfm_steps.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <set>
 
-#include "calib/colmap/colmap_steps.h"
-#include "calib/colmap/own_steps.h"
+#include "calib/sfm/run/colmap_steps.h"
+#include "calib/sfm/run/own_steps.h"
 #include "dtr/base/error.h"
 
 namespace dtr::colmap {

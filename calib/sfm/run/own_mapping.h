@@ -1,9 +1,9 @@
-// calib/colmap/own_mapping.h -- the global mapper, and COLMAP's where its model does not pass.
+// calib/sfm/run/own_mapping.h -- the global mapper, and COLMAP's where its model does not pass.
 #pragma once
 #include <vector>
 
-#include "calib/colmap/feature_plan.h"
-#include "calib/colmap/workspace.h"
+#include "calib/sfm/run/feature_plan.h"
+#include "calib/sfm/run/workspace.h"
 
 namespace dtr::colmap {
 

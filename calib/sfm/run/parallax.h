@@ -1,9 +1,9 @@
-// calib/colmap/parallax.h -- did the camera move against what the photos show? From their matches.
+// calib/sfm/run/parallax.h -- did the camera move against what the photos show? From their matches.
 #pragma once
 #include <string>
 #include <vector>
 
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 #include "calib/sfm/run/match_summary.h"
 
 namespace dtr::colmap {

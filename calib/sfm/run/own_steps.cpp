@@ -1,4 +1,4 @@
-#include "calib/colmap/own_steps.h"
+#include "calib/sfm/run/own_steps.h"
 
 #include <fmt/format.h>
 
@@ -7,9 +7,9 @@
 #include <functional>
 #include <map>
 
-#include "calib/colmap/feature_parts.h"
-#include "calib/colmap/parallax.h"
-#include "calib/colmap/point_colours.h"
+#include "calib/sfm/run/feature_parts.h"
+#include "calib/sfm/run/parallax.h"
+#include "calib/sfm/run/point_colours.h"
 #include "calib/models/fisheye.h"
 #include "calib/sfm/features/sift.h"
 #include "calib/sfm/mapping/global_mapper.h"

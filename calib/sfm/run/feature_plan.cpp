@@ -1,4 +1,4 @@
-#include "calib/colmap/feature_plan.h"
+#include "calib/sfm/run/feature_plan.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "calib/colmap/point_colours.h"
+#include "calib/sfm/run/point_colours.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-// calib/colmap/sfm.h -- structure from motion by calib/sfm and the `colmap` program.
+// calib/sfm/run/sfm.h -- structure from motion by calib/sfm and the `colmap` program.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -36,7 +36,7 @@ struct SfmImageInput {
 enum class Matching {
   kAuto,         ///< exhaustive up to kExhaustiveLimit photos, preselected beyond
   kExhaustive,   ///< every pair
-  kPreselected,  ///< pairs that resemble each other in small images (calib/colmap/pairs.h)
+  kPreselected,  ///< pairs that resemble each other in small images (calib/sfm/run/pairs.h)
   kSequential,   ///< neighbours in the order of names: video
 };
 

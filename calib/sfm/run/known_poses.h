@@ -1,10 +1,10 @@
-// calib/colmap/known_poses.h -- sparse points for photos whose cameras and poses are given.
+// calib/sfm/run/known_poses.h -- sparse points for photos whose cameras and poses are given.
 #pragma once
 #include <filesystem>
 #include <span>
 #include <string>
 
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 #include "calib/lens_camera.h"
 #include "dtr/types/pose.h"
 

@@ -1,4 +1,4 @@
-// calib/colmap/workspace.h -- the folder in which structure from motion works: photos, steps,
+// calib/sfm/run/workspace.h -- the folder in which structure from motion works: photos, steps,
 // checkpoints, records.
 #pragma once
 #include <filesystem>
@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 
 namespace dtr::colmap {
 
