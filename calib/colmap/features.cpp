@@ -13,7 +13,7 @@ namespace dtr::colmap {
 namespace {
 
 // COLMAP skips what it cannot read and ends with 0.
-void ExpectInDatabase(const Workspace& workspace, const std::filesystem::path& database,
+void ExpectInDatabase(const sfm::Workspace& workspace, const std::filesystem::path& database,
                       const std::vector<size_t>& images) {
   const auto ids = ReadDatabaseIds(database);
   for (const size_t i : images) {
@@ -26,19 +26,19 @@ void ExpectInDatabase(const Workspace& workspace, const std::filesystem::path& d
 }
 
 // The camera that the database has of photos of a group already.
-std::optional<std::uint32_t> CameraOf(const Workspace& workspace,
+std::optional<std::uint32_t> CameraOf(const sfm::Workspace& workspace,
                                       const std::filesystem::path& database,
-                                      const CameraGroup& group) {
+                                      const sfm::CameraGroup& group) {
   const auto ids = ReadDatabaseIds(database);
   const auto known = ids.find(workspace.AliasOf(group.images.front()));
   return known == ids.end() ? std::nullopt : std::optional(known->second.camera_id);
 }
 
 // `camera_id`: the group's in the database, where it has one.
-Arguments ExtractorArguments(Program& program, Workspace& workspace,
-                             const std::filesystem::path& database, const CameraGroup& group,
+Arguments ExtractorArguments(Program& program, sfm::Workspace& workspace,
+                             const std::filesystem::path& database, const sfm::CameraGroup& group,
                              const ExtractionRun& run, std::optional<std::uint32_t> camera_id,
-                             const ExtractionPlan& plan, std::uint64_t seed) {
+                             const sfm::ExtractionPlan& plan, std::uint64_t seed) {
   std::vector<std::string> names;
   for (const size_t i : run.images) names.push_back(workspace.AliasOf(i));
   const auto list =
@@ -67,7 +67,7 @@ Arguments ExtractorArguments(Program& program, Workspace& workspace,
   }
   arguments.Add({"ImageReader.single_camera"}, "1");
   if (!group.params.empty()) {
-    arguments.Add({"ImageReader.camera_params"}, ParamsText(group.params));
+    arguments.Add({"ImageReader.camera_params"}, sfm::ParamsText(group.params));
   }
   return arguments;
 }
@@ -79,12 +79,14 @@ size_t PhotosIn(const std::vector<ExtractionRun>& batch) {
 }
 
 // `before`: photos of the groups whose features the database holds already.
-void ExtractBatch(Program& program, Workspace& workspace, const std::filesystem::path& database,
-                  const std::vector<CameraGroup>& groups, const std::vector<ExtractionRun>& batch,
-                  const ExtractionPlan& plan, std::uint64_t seed, size_t before) {
+void ExtractBatch(Program& program, sfm::Workspace& workspace,
+                  const std::filesystem::path& database,
+                  const std::vector<sfm::CameraGroup>& groups,
+                  const std::vector<ExtractionRun>& batch, const sfm::ExtractionPlan& plan,
+                  std::uint64_t seed, size_t before) {
   int done = static_cast<int>(before);
   for (const ExtractionRun& run : batch) {
-    const CameraGroup& group = groups[run.group];
+    const sfm::CameraGroup& group = groups[run.group];
     auto camera_id = group.camera_id;
     if (!camera_id && before > 0) camera_id = CameraOf(workspace, database, group);
     RunStep(workspace,
@@ -100,7 +102,7 @@ void ExtractBatch(Program& program, Workspace& workspace, const std::filesystem:
 
 }  // namespace
 
-std::vector<std::vector<ExtractionRun>> InBatches(const std::vector<CameraGroup>& groups) {
+std::vector<std::vector<ExtractionRun>> InBatches(const std::vector<sfm::CameraGroup>& groups) {
   std::vector<std::vector<ExtractionRun>> batches;
   size_t before = 0, in_batch = 0, limit = 0;
   for (size_t g = 0; g < groups.size(); ++g) {
@@ -108,7 +110,7 @@ std::vector<std::vector<ExtractionRun>> InBatches(const std::vector<CameraGroup>
       if (in_batch == limit) {
         before += in_batch;
         in_batch = 0;
-        limit = std::max(kPhotosPerBatch, before / 4);
+        limit = std::max(sfm::kPhotosPerBatch, before / 4);
         batches.emplace_back();
       }
       auto& batch = batches.back();
@@ -120,8 +122,9 @@ std::vector<std::vector<ExtractionRun>> InBatches(const std::vector<CameraGroup>
   return batches;
 }
 
-void ExtractFeatures(Program& program, Workspace& workspace, const std::filesystem::path& database,
-                     const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
+void ExtractFeatures(Program& program, sfm::Workspace& workspace,
+                     const std::filesystem::path& database,
+                     const std::vector<sfm::CameraGroup>& groups, const sfm::ExtractionPlan& plan,
                      std::uint64_t seed) {
   workspace.progress().Stage("features", static_cast<int>(workspace.images().size()));
   size_t before = 0;
@@ -131,10 +134,10 @@ void ExtractFeatures(Program& program, Workspace& workspace, const std::filesyst
   }
 }
 
-void ExtractFeaturesResumably(Program& program, Workspace& workspace,
+void ExtractFeaturesResumably(Program& program, sfm::Workspace& workspace,
                               const std::filesystem::path& database,
-                              const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
-                              std::uint64_t seed) {
+                              const std::vector<sfm::CameraGroup>& groups,
+                              const sfm::ExtractionPlan& plan, std::uint64_t seed) {
   const std::filesystem::path working = database.string() + ".working",
                               note = database.string() + ".begun";
   const size_t kept = std::filesystem::exists(database) ? workspace.Kept(note).value_or(0) : 0;
@@ -160,7 +163,7 @@ void ExtractFeaturesResumably(Program& program, Workspace& workspace,
     }
     before = after;
   }
-  for (const CameraGroup& group : groups) ExpectInDatabase(workspace, database, group.images);
+  for (const sfm::CameraGroup& group : groups) ExpectInDatabase(workspace, database, group.images);
 }
 
 }  // namespace dtr::colmap

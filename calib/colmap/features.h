@@ -3,8 +3,8 @@
 #include <filesystem>
 #include <vector>
 
-#include "calib/sfm/run/feature_plan.h"
 #include "calib/colmap/program.h"
+#include "calib/sfm/run/feature_plan.h"
 #include "calib/sfm/run/workspace.h"
 
 namespace dtr::colmap {
@@ -17,20 +17,21 @@ struct ExtractionRun {
 
 /// All photos of the groups, in their order, in batches of kPhotosPerBatch or a quarter of those
 /// before, whichever is more: what is copied to keep them is then a few times the whole at most.
-std::vector<std::vector<ExtractionRun>> InBatches(const std::vector<CameraGroup>& groups);
+std::vector<std::vector<ExtractionRun>> InBatches(const std::vector<sfm::CameraGroup>& groups);
 
 /// Extracts into `database`, one extractor run per group or part of one; parts of a group share the
 /// camera that its first made. Throws as RunStep, and Error when a photo could not be read
 /// by COLMAP.
-void ExtractFeatures(Program& program, Workspace& workspace, const std::filesystem::path& database,
-                     const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
+void ExtractFeatures(Program& program, sfm::Workspace& workspace,
+                     const std::filesystem::path& database,
+                     const std::vector<sfm::CameraGroup>& groups, const sfm::ExtractionPlan& plan,
                      std::uint64_t seed);
 
 /// The same, batch by batch: after each, `database` holds it whole, and an interrupted extraction
 /// of a workspace with the same fingerprint goes on after the last of them.
-void ExtractFeaturesResumably(Program& program, Workspace& workspace,
+void ExtractFeaturesResumably(Program& program, sfm::Workspace& workspace,
                               const std::filesystem::path& database,
-                              const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
-                              std::uint64_t seed);
+                              const std::vector<sfm::CameraGroup>& groups,
+                              const sfm::ExtractionPlan& plan, std::uint64_t seed);
 
 }  // namespace dtr::colmap

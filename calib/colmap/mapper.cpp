@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "calib/sfm/run/sfm_steps.h"
 #include "calib/colmap/workspace_files.h"
+#include "calib/sfm/run/sfm_steps.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -38,8 +38,8 @@ enum class Mapping {
 
 // Runs the mapper; false where it found no two photos to start from, which COLMAP takes for an
 // error: it is a finding about the photos.
-bool RunMapper(Program& program, Workspace& workspace, const fs::path& models, std::uint64_t seed,
-               Mapping mapping) {
+bool RunMapper(Program& program, sfm::Workspace& workspace, const fs::path& models,
+               std::uint64_t seed, Mapping mapping) {
   Arguments arguments(program, "mapper");
   arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", seed))
       .AddIfKnown({"Mapper.random_seed"}, fmt::format("{}", seed))
@@ -74,7 +74,7 @@ bool RunMapper(Program& program, Workspace& workspace, const fs::path& models, s
 
 // The folders "0", "1", ... in which the mapper leaves its models, as models; largest first (by
 // images, then points, then number).
-std::vector<calib::SfmModel> ModelsIn(const Workspace& workspace, const fs::path& folder) {
+std::vector<calib::SfmModel> ModelsIn(const sfm::Workspace& workspace, const fs::path& folder) {
   std::vector<calib::SfmModel> models;
   for (int i = 0; fs::is_directory(folder / std::to_string(i)); ++i) {
     models.push_back(ReadModelHere(workspace, folder / std::to_string(i)));
@@ -86,10 +86,11 @@ std::vector<calib::SfmModel> ModelsIn(const Workspace& workspace, const fs::path
   return models;
 }
 
-std::vector<calib::SfmModel> MadeIn(Program& program, Workspace& workspace, const fs::path& models,
-                                    const SfmOptions& options, Mapping mapping) {
+std::vector<calib::SfmModel> MadeIn(Program& program, sfm::Workspace& workspace,
+                                    const fs::path& models, const sfm::SfmOptions& options,
+                                    Mapping mapping) {
   RemoveTree(models);
-  MakeFolder(models);
+  sfm::MakeFolder(models);
   if (options.intrinsics_are_known && mapping == Mapping::kFree) {
     mapping = Mapping::kFixedIntrinsics;
   }
@@ -104,14 +105,14 @@ size_t PhotosOf(const std::vector<calib::SfmModel>& made) {
 
 // What the mapper makes of photos of which it made `free`, nothing or little, with free intrinsics;
 // `free` where that is no more.
-std::vector<calib::SfmModel> MadeOtherwise(Program& program, Workspace& workspace,
+std::vector<calib::SfmModel> MadeOtherwise(Program& program, sfm::Workspace& workspace,
                                            const fs::path& models,
-                                           const std::vector<CameraGroup>& groups,
-                                           const SfmOptions& options,
+                                           const std::vector<sfm::CameraGroup>& groups,
+                                           const sfm::SfmOptions& options,
                                            std::vector<calib::SfmModel> free) {
   constexpr double kMaxPhotos = 0.75;
   std::vector<calib::SfmModel> fixed;
-  if (AllHavePriors(groups)) {
+  if (sfm::AllHavePriors(groups)) {
     workspace.progress().Note(
         "COLMAP made no model with free focal lengths; trying with those of EXIF, fixed");
     fixed = MadeIn(program, workspace, models, options, Mapping::kFixedIntrinsics);
@@ -127,16 +128,16 @@ std::vector<calib::SfmModel> MadeOtherwise(Program& program, Workspace& workspac
   const bool take_fixed = PhotosOf(fixed) > PhotosOf(forward);
   std::vector<calib::SfmModel>& made = take_fixed ? fixed : forward;
   if (!free.empty() && PhotosOf(made) <= PhotosOf(free)) return free;
-  WriteFileAtomically(workspace.folder() / (take_fixed ? kFixedIntrinsicsNote : kForwardMotionNote),
-                      "");
+  WriteFileAtomically(
+      workspace.folder() / (take_fixed ? sfm::kFixedIntrinsicsNote : sfm::kForwardMotionNote), "");
   return std::move(made);
 }
 
 }  // namespace
 
-std::vector<calib::SfmModel> MapByColmap(Workspace& workspace,
-                                         const std::vector<CameraGroup>& groups,
-                                         const SfmOptions& options) {
+std::vector<calib::SfmModel> MapByColmap(sfm::Workspace& workspace,
+                                         const std::vector<sfm::CameraGroup>& groups,
+                                         const sfm::SfmOptions& options) {
   Program program;
   const fs::path models = workspace.folder() / "models";
   auto made = MadeIn(program, workspace, models, options, Mapping::kFree);
@@ -146,7 +147,8 @@ std::vector<calib::SfmModel> MapByColmap(Workspace& workspace,
   return none ? MadeOtherwise(program, workspace, models, groups, options, std::move(made)) : made;
 }
 
-std::optional<calib::SfmModel> MapFixedByColmap(Workspace& workspace, const SfmOptions& options) {
+std::optional<calib::SfmModel> MapFixedByColmap(sfm::Workspace& workspace,
+                                                const sfm::SfmOptions& options) {
   Program program;
   auto made = MadeIn(program, workspace, workspace.folder() / "fixed" / "models", options,
                      Mapping::kFixedIntrinsics);
@@ -158,7 +160,7 @@ void AllowForwardMotion(Arguments& arguments) {
   arguments.AddIfKnown({"Mapper.init_max_forward_motion"}, "1")
       .AddIfKnown({"Mapper.init_min_tri_angle"}, "2")
       .AddIfKnown({"Mapper.filter_min_tri_angle"}, "0.5")
-      .AddIfKnown({"Mapper.abs_pose_min_num_inliers"}, std::to_string(kMinInliersForward));
+      .AddIfKnown({"Mapper.abs_pose_min_num_inliers"}, std::to_string(sfm::kMinInliersForward));
 }
 
 }  // namespace dtr::colmap

@@ -8,10 +8,11 @@
 namespace dtr::colmap {
 
 /// See ColmapSteps::Map and MapFixed.
-std::vector<calib::SfmModel> MapByColmap(Workspace& workspace,
-                                         const std::vector<CameraGroup>& groups,
-                                         const SfmOptions& options);
-std::optional<calib::SfmModel> MapFixedByColmap(Workspace& workspace, const SfmOptions& options);
+std::vector<calib::SfmModel> MapByColmap(sfm::Workspace& workspace,
+                                         const std::vector<sfm::CameraGroup>& groups,
+                                         const sfm::SfmOptions& options);
+std::optional<calib::SfmModel> MapFixedByColmap(sfm::Workspace& workspace,
+                                                const sfm::SfmOptions& options);
 
 /// COLMAP starts from two photos that see the scene from 16 degrees apart, or 4 where it finds
 /// none, and not along the line of sight. A walk straight ahead through a street has no such pair.

@@ -27,7 +27,7 @@ Arguments MatcherArguments(Program& program, const char* command,
   return arguments;
 }
 
-void RunMatcher(Workspace& workspace, const Arguments& arguments) {
+void RunMatcher(sfm::Workspace& workspace, const Arguments& arguments) {
   constexpr int kPercent = 100;
   workspace.progress().Stage("matching", kPercent);
   RunStep(workspace, arguments, [&](const std::string& line) {
@@ -38,19 +38,21 @@ void RunMatcher(Workspace& workspace, const Arguments& arguments) {
 }
 
 // The pairs to name to COLMAP; empty where it takes all that its matcher finds by itself.
-std::optional<ImagePairs> PairsToMatch(Workspace& workspace, Matching matching, double memory_gb,
-                                       const std::optional<ImagePairs>& allowed) {
+std::optional<sfm::ImagePairs> PairsToMatch(sfm::Workspace& workspace, sfm::Matching matching,
+                                            double memory_gb,
+                                            const std::optional<sfm::ImagePairs>& allowed) {
   const size_t count = workspace.images().size(), all = count * (count - 1) / 2;
   if (allowed && allowed->size() < all) {
     workspace.progress().Note(fmt::format(
         "{} of {} pairs of photos left out of matching: their cameras cannot see the same thing",
         all - allowed->size(), all));
   }
-  if (matching == Matching::kExhaustive && allowed && allowed->size() < all) return allowed;
-  if (matching != Matching::kPreselected) return {};
+  if (matching == sfm::Matching::kExhaustive && allowed && allowed->size() < all) return allowed;
+  if (matching != sfm::Matching::kPreselected) return {};
   std::vector<std::filesystem::path> files;
   for (size_t i = 0; i < count; ++i) files.push_back(workspace.FileOf(i));
-  ImagePairs pairs = PreselectPairs(files, workspace.threads(), memory_gb, workspace.progress());
+  sfm::ImagePairs pairs =
+      sfm::PreselectPairs(files, workspace.threads(), memory_gb, workspace.progress());
   if (allowed) {
     std::erase_if(pairs, [&](const auto& pair) {
       return !std::binary_search(allowed->begin(), allowed->end(), pair);
@@ -68,7 +70,7 @@ std::optional<ImagePairs> PairsToMatch(Workspace& workspace, Matching matching, 
 }  // namespace
 
 int MatchingThreads(int threads, double memory_gb) {
-  return std::clamp(static_cast<int>(kFill * memory_gb / kMatcherGib), 1, threads);
+  return std::clamp(static_cast<int>(sfm::kFill * memory_gb / kMatcherGib), 1, threads);
 }
 
 int MatchingPercent(const std::string& line) {
@@ -87,7 +89,7 @@ int MatchingPercent(const std::string& line) {
                           (static_cast<double>(rows) * columns));
 }
 
-void MatchPairs(Program& program, Workspace& workspace, const std::filesystem::path& database,
+void MatchPairs(Program& program, sfm::Workspace& workspace, const std::filesystem::path& database,
                 const std::vector<std::pair<std::string, std::string>>& pairs, int threads,
                 std::uint64_t seed) {
   std::vector<std::string> lines;
@@ -98,9 +100,9 @@ void MatchPairs(Program& program, Workspace& workspace, const std::filesystem::p
   RunMatcher(workspace, arguments);
 }
 
-void MatchPhotos(Program& program, Workspace& workspace, const std::filesystem::path& database,
-                 Matching matching, double memory_gb, std::uint64_t seed,
-                 const std::optional<ImagePairs>& allowed) {
+void MatchPhotos(Program& program, sfm::Workspace& workspace, const std::filesystem::path& database,
+                 sfm::Matching matching, double memory_gb, std::uint64_t seed,
+                 const std::optional<sfm::ImagePairs>& allowed) {
   const int threads = MatchingThreads(workspace.threads(), memory_gb);
   if (const auto pairs = PairsToMatch(workspace, matching, memory_gb, allowed)) {
     std::vector<std::pair<std::string, std::string>> names;
@@ -109,7 +111,7 @@ void MatchPhotos(Program& program, Workspace& workspace, const std::filesystem::
     MatchPairs(program, workspace, database, names, threads, seed);
     return;
   }
-  const bool sequential = matching == Matching::kSequential;
+  const bool sequential = matching == sfm::Matching::kSequential;
   Arguments arguments = MatcherArguments(
       program, sequential ? "sequential_matcher" : "exhaustive_matcher", database, threads, seed);
   if (sequential) {

@@ -7,10 +7,10 @@
 namespace dtr::colmap {
 
 /// See ColmapSteps::Triangulate and Register.
-calib::SfmModel TriangulateByColmap(Workspace& workspace, const calib::SfmModel& posed,
-                                    const SfmOptions& options);
-void RegisterByColmap(Workspace& workspace, const RegistrationInput& input,
-                      const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
-                      const SfmOptions& options, const std::filesystem::path& registered);
+calib::SfmModel TriangulateByColmap(sfm::Workspace& workspace, const calib::SfmModel& posed,
+                                    const sfm::SfmOptions& options);
+void RegisterByColmap(sfm::Workspace& workspace, const sfm::RegistrationInput& input,
+                      const std::vector<sfm::CameraGroup>& groups, const sfm::ExtractionPlan& plan,
+                      const sfm::SfmOptions& options, const std::filesystem::path& registered);
 
 }  // namespace dtr::colmap

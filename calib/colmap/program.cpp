@@ -74,7 +74,7 @@ std::string HowItEnded(const ProcessResult& result) {
 
 bool Program::IsInstalled() { return !FindProgram(kProgram).empty(); }
 
-ColmapState Program::Find() {
+sfm::ColmapState Program::Find() {
   if (!IsInstalled()) return {};
   try {
     return {Program().version(), ""};
@@ -139,7 +139,7 @@ Arguments& Arguments::AddIfKnown(std::initializer_list<const char*> names,
   return program_.FindOption(command_, names) == nullptr ? *this : Add(names, value);
 }
 
-void RunColmap(const std::vector<std::string>& argv, StepRecord& record,
+void RunColmap(const std::vector<std::string>& argv, sfm::StepRecord& record,
                const std::function<void(const std::string&)>& on_line, Progress& progress) {
   progress.ThrowIfInterrupted();
   record.argv = argv;
@@ -166,9 +166,9 @@ void RunColmap(const std::vector<std::string>& argv, StepRecord& record,
                           cause.Cause(), record.log_file.string()));
 }
 
-void RunStep(Workspace& workspace, const Arguments& arguments,
+void RunStep(sfm::Workspace& workspace, const Arguments& arguments,
              const std::function<void(const std::string&)>& on_line) {
-  workspace.RunProgram([&](StepRecord& record) {
+  workspace.RunProgram([&](sfm::StepRecord& record) {
     RunColmap(arguments.argv(), record, on_line, workspace.progress());
   });
 }

@@ -22,7 +22,7 @@ class Program {
 
   /// Whether there is a colmap on the PATH at all.
   static bool IsInstalled();
-  static ColmapState Find();
+  static sfm::ColmapState Find();
 
   const std::string& version() const { return version_; }
   /// Whether it was built with CUDA, by its own words.
@@ -60,11 +60,11 @@ class Arguments {
 /// of `record` but its name is filled in, also when this throws.
 /// Throws Interrupted when `progress` asks to stop (the program is ended first), and Error, naming
 /// step, cause and log, unless the program exits with 0.
-void RunColmap(const std::vector<std::string>& argv, StepRecord& record,
+void RunColmap(const std::vector<std::string>& argv, sfm::StepRecord& record,
                const std::function<void(const std::string&)>& on_line, Progress& progress);
 
 /// The same inside a step of a workspace.
-void RunStep(Workspace& workspace, const Arguments& arguments,
+void RunStep(sfm::Workspace& workspace, const Arguments& arguments,
              const std::function<void(const std::string&)>& on_line);
 
 }  // namespace dtr::colmap

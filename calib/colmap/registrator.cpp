@@ -18,7 +18,7 @@ namespace {
 // before refinement and perhaps of another lens model (it crashes then), in the place of a camera
 // that no registered image has: where `camera_id` is such a one, an image of the copy takes it.
 // Registration looks at points, not at other images' cameras.
-void WriteAliased(const fs::path& folder, const RegistrationInput& input,
+void WriteAliased(const fs::path& folder, const sfm::RegistrationInput& input,
                   std::optional<std::uint32_t> camera_id) {
   calib::SfmModel model = input.model;
   if (camera_id && !HasImages(model, *camera_id)) model.images.front().camera_id = *camera_id;
@@ -28,9 +28,9 @@ void WriteAliased(const fs::path& folder, const RegistrationInput& input,
 
 }  // namespace
 
-void RegisterByColmap(Workspace& workspace, const RegistrationInput& input,
-                      const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
-                      const SfmOptions& options, const fs::path& registered) {
+void RegisterByColmap(sfm::Workspace& workspace, const sfm::RegistrationInput& input,
+                      const std::vector<sfm::CameraGroup>& groups, const sfm::ExtractionPlan& plan,
+                      const sfm::SfmOptions& options, const fs::path& registered) {
   Program program;
   const fs::path database = DatabaseOf(workspace), sources = input.workspace / database.filename(),
                  model = workspace.folder() / "source";
@@ -47,7 +47,7 @@ void RegisterByColmap(Workspace& workspace, const RegistrationInput& input,
   }
   MatchPairs(program, workspace, database, pairs, 1, options.seed);
   RemoveTree(model);
-  MakeFolder(registered);
+  sfm::MakeFolder(registered);
   WriteAliased(model, input, groups.front().camera_id);
   Arguments arguments(program, "image_registrator");
   arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", options.seed))

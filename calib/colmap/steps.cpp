@@ -8,11 +8,11 @@
 #include "calib/colmap/mapper.h"
 #include "calib/colmap/matching.h"
 #include "calib/colmap/model_io.h"
-#include "calib/sfm/run/own_steps.h"
-#include "calib/sfm/run/parallax.h"
 #include "calib/colmap/placement.h"
 #include "calib/colmap/program.h"
 #include "calib/colmap/workspace_files.h"
+#include "calib/sfm/run/own_steps.h"
+#include "calib/sfm/run/parallax.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/files.h"
 
@@ -25,11 +25,13 @@ constexpr std::uintmax_t kLargestStepNote = 1 << 12;
 // Of TwoViewGeometry::ConfigurationType: one homography explains these.
 constexpr int kFirstPlanar = 4, kLastPlanar = 7;
 
-fs::path FeatureDatabaseOf(const Workspace& workspace) { return workspace.folder() / "features.db"; }
+fs::path FeatureDatabaseOf(const sfm::Workspace& workspace) {
+  return workspace.folder() / "features.db";
+}
 
-class ProgramSteps final : public ColmapSteps {
+class ProgramSteps final : public sfm::ColmapSteps {
  public:
-  ColmapState Find() const override { return Program::Find(); }
+  sfm::ColmapState Find() const override { return Program::Find(); }
   std::string Version() const override { return Program().version(); }
   calib::SfmModel ReadModel(const fs::path& folder) const override {
     return colmap::ReadModel(folder);
@@ -38,14 +40,14 @@ class ProgramSteps final : public ColmapSteps {
     colmap::WriteModel(folder, model, Format::kBinary);
   }
 
-  void Extract(Workspace& workspace, const std::vector<CameraGroup>& groups,
-               const ExtractionPlan& plan, std::uint64_t seed) const override {
+  void Extract(sfm::Workspace& workspace, const std::vector<sfm::CameraGroup>& groups,
+               const sfm::ExtractionPlan& plan, std::uint64_t seed) const override {
     Program program;
     ExtractFeaturesResumably(program, workspace, FeatureDatabaseOf(workspace), groups, plan, seed);
   }
 
-  void Match(Workspace& workspace, Matching matching, const SfmOptions& options,
-             const std::optional<ImagePairs>& allowed) const override {
+  void Match(sfm::Workspace& workspace, sfm::Matching matching, const sfm::SfmOptions& options,
+             const std::optional<sfm::ImagePairs>& allowed) const override {
     Program program;
     const fs::path database = DatabaseOf(workspace);
     // Matching may take hours: an interrupted run of the same inputs goes on with its pairs.
@@ -60,7 +62,7 @@ class ProgramSteps final : public ColmapSteps {
     MatchPhotos(program, workspace, database, matching, options.memory_gb, options.seed, allowed);
   }
 
-  sfm::MatchSummary Matched(const Workspace& workspace) const override {
+  sfm::MatchSummary Matched(const sfm::Workspace& workspace) const override {
     const fs::path database = DatabaseOf(workspace);
     const auto ids = ReadDatabaseIds(database);
     std::map<std::uint32_t, size_t> photo_of;
@@ -80,16 +82,17 @@ class ProgramSteps final : public ColmapSteps {
       summary.pairs.push_back({a->second, b->second,
                                static_cast<std::int64_t>(pair.moved_px.size()),
                                pair.config >= kFirstPlanar && pair.config <= kLastPlanar,
-                               AreStill(pair.moved_px, workspace.images()[a->second])});
+                               sfm::AreStill(pair.moved_px, workspace.images()[a->second])});
     });
     return summary;
   }
 
-  std::vector<calib::SfmModel> Map(Workspace& workspace, const std::vector<CameraGroup>& groups,
-                                   const SfmOptions& options) const override {
-    if (options.engine == SfmEngine::kColmap) return MapByColmap(workspace, groups, options);
+  std::vector<calib::SfmModel> Map(sfm::Workspace& workspace,
+                                   const std::vector<sfm::CameraGroup>& groups,
+                                   const sfm::SfmOptions& options) const override {
+    if (options.engine == sfm::SfmEngine::kColmap) return MapByColmap(workspace, groups, options);
     const fs::path database = DatabaseOf(workspace);
-    sfm::ViewGraph graph = ReadGraph(workspace);
+    sfm::ViewGraph graph = sfm::ReadGraph(workspace);
     for (size_t i = 0; i < graph.images.size(); ++i) graph.images[i].name = workspace.AliasOf(i);
     WriteGraphDatabase(database, graph, sfm::FeatureFile(workspace.folder() / sfm::kFeatureFile));
     try {
@@ -101,24 +104,24 @@ class ProgramSteps final : public ColmapSteps {
       throw;
     }
   }
-  std::optional<calib::SfmModel> MapFixed(Workspace& workspace,
-                                          const SfmOptions& options) const override {
+  std::optional<calib::SfmModel> MapFixed(sfm::Workspace& workspace,
+                                          const sfm::SfmOptions& options) const override {
     return MapFixedByColmap(workspace, options);
   }
-  calib::SfmModel Triangulate(Workspace& workspace, const calib::SfmModel& posed,
-                              const SfmOptions& options) const override {
+  calib::SfmModel Triangulate(sfm::Workspace& workspace, const calib::SfmModel& posed,
+                              const sfm::SfmOptions& options) const override {
     return TriangulateByColmap(workspace, posed, options);
   }
-  void Register(Workspace& workspace, const RegistrationInput& input,
-                const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
-                const SfmOptions& options, const fs::path& registered) const override {
+  void Register(sfm::Workspace& workspace, const sfm::RegistrationInput& input,
+                const std::vector<sfm::CameraGroup>& groups, const sfm::ExtractionPlan& plan,
+                const sfm::SfmOptions& options, const fs::path& registered) const override {
     RegisterByColmap(workspace, input, groups, plan, options, registered);
   }
 };
 
 }  // namespace
 
-const ColmapSteps& Steps() {
+const sfm::ColmapSteps& Steps() {
   static const ProgramSteps steps;
   return steps;
 }

@@ -5,6 +5,6 @@
 namespace dtr::colmap {
 
 /// By the `colmap` on the PATH.
-const ColmapSteps& Steps();
+const sfm::ColmapSteps& Steps();
 
 }  // namespace dtr::colmap

@@ -3,9 +3,9 @@
 #include <algorithm>
 
 #include "calib/colmap/database.h"
-#include "calib/sfm/run/known_poses.h"
 #include "calib/colmap/placement.h"
 #include "calib/colmap/workspace_files.h"
+#include "calib/sfm/run/known_poses.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 
@@ -40,7 +40,8 @@ void CheckKept(const std::string& where, const calib::SfmModel& posed,
 }
 
 // The posed model under the numbers of the database, which extractor threads hand out as they go.
-calib::SfmModel NumberedAsInDatabase(const Workspace& workspace, const calib::SfmModel& posed) {
+calib::SfmModel NumberedAsInDatabase(const sfm::Workspace& workspace,
+                                     const calib::SfmModel& posed) {
   const auto ids = ReadDatabaseIds(DatabaseOf(workspace));
   calib::SfmModel model;
   for (size_t i = 0; i < posed.images.size(); ++i) {
@@ -61,12 +62,12 @@ calib::SfmModel NumberedAsInDatabase(const Workspace& workspace, const calib::Sf
 
 }  // namespace
 
-calib::SfmModel TriangulateByColmap(Workspace& workspace, const calib::SfmModel& posed,
-                                    const SfmOptions& options) {
+calib::SfmModel TriangulateByColmap(sfm::Workspace& workspace, const calib::SfmModel& posed,
+                                    const sfm::SfmOptions& options) {
   Program program;
   const fs::path input = workspace.folder() / "posed", output = workspace.folder() / "triangulated";
   for (const fs::path& folder : {input, output}) RemoveTree(folder);
-  MakeFolder(output);
+  sfm::MakeFolder(output);
   WriteModelHere(workspace, input, NumberedAsInDatabase(workspace, posed));
   Arguments arguments(program, "point_triangulator");
   arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", options.seed))
@@ -93,7 +94,8 @@ calib::SfmModel TriangulateByColmap(Workspace& workspace, const calib::SfmModel&
     throw;
   } catch (const Error&) {
     // It fails, too, where there is nothing to triangulate.
-    RequireMatches(ReadDatabaseMatches(DatabaseOf(workspace)).pairs.size(), posed.images.size());
+    sfm::RequireMatches(ReadDatabaseMatches(DatabaseOf(workspace)).pairs.size(),
+                        posed.images.size());
     throw;
   }
   calib::SfmModel found = ReadModelHere(workspace, output);

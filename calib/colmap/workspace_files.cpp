@@ -10,13 +10,14 @@
 namespace dtr::colmap {
 namespace fs = std::filesystem;
 
-calib::SfmModel ReadModelHere(const Workspace& workspace, const fs::path& folder) {
+calib::SfmModel ReadModelHere(const sfm::Workspace& workspace, const fs::path& folder) {
   calib::SfmModel model = ReadModel(folder);
   for (calib::SfmImage& image : model.images) image.name = workspace.NameOfAlias(image.name);
   return model;  // aliases sort as the names do
 }
 
-void WriteModelHere(const Workspace& workspace, const fs::path& folder, calib::SfmModel model) {
+void WriteModelHere(const sfm::Workspace& workspace, const fs::path& folder,
+                    calib::SfmModel model) {
   const auto& images = workspace.images();
   for (calib::SfmImage& image : model.images) {
     const auto known = std::lower_bound(images.begin(), images.end(), image.name,

@@ -7,14 +7,14 @@
 
 namespace dtr::colmap {
 
-inline std::filesystem::path DatabaseOf(const Workspace& workspace) {
+inline std::filesystem::path DatabaseOf(const sfm::Workspace& workspace) {
   return workspace.folder() / "database.db";
 }
 
 /// Reads a model COLMAP made here and gives the images their own names back.
-calib::SfmModel ReadModelHere(const Workspace& workspace, const std::filesystem::path& folder);
+calib::SfmModel ReadModelHere(const sfm::Workspace& workspace, const std::filesystem::path& folder);
 /// The inverse: writes a model for COLMAP to read. Every image must be one of the workspace's.
-void WriteModelHere(const Workspace& workspace, const std::filesystem::path& folder,
+void WriteModelHere(const sfm::Workspace& workspace, const std::filesystem::path& folder,
                     calib::SfmModel model);
 
 }  // namespace dtr::colmap

@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "calib/sfm/run/feature_plan.h"
-#include "calib/sfm/run/workspace.h"
 #include "calib/sfm/run/match_summary.h"
+#include "calib/sfm/run/workspace.h"
 #include "calib/sfm_model.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 
 /// A `colmap` program, without a throw.
 struct ColmapState {
@@ -49,7 +49,7 @@ class ColmapSteps {
                        const ExtractionPlan& plan, std::uint64_t seed) const = 0;
   virtual void Match(Workspace& workspace, Matching matching, const SfmOptions& options,
                      const std::optional<ImagePairs>& allowed) const = 0;
-  virtual sfm::MatchSummary Matched(const Workspace& workspace) const = 0;
+  virtual MatchSummary Matched(const Workspace& workspace) const = 0;
   /// Models, largest first. With another engine than kColmap, of the workspace's features and
   /// matches (store.h), of which a database is made for as long as this takes.
   virtual std::vector<calib::SfmModel> Map(Workspace& workspace,
@@ -69,4 +69,4 @@ class ColmapSteps {
                         const std::filesystem::path& registered) const = 0;
 };
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

@@ -8,7 +8,7 @@
 #include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 namespace fs = std::filesystem;
 namespace {
 
@@ -47,8 +47,8 @@ FeatureParts::FeatureParts(Workspace& workspace, const fs::path& all) : all_(all
   }
 }
 
-std::optional<sfm::Features> FeatureParts::Of(size_t photo) const {
-  for (const sfm::FeatureFile& part : parts_) {
+std::optional<Features> FeatureParts::Of(size_t photo) const {
+  for (const FeatureFile& part : parts_) {
     if (part.Has(photo)) return part.Of(photo);
   }
   return std::nullopt;
@@ -58,4 +58,4 @@ void FeatureParts::Remove() const {
   for (const fs::path& file : FilesOfParts(all_)) RemoveTree(file);
 }
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

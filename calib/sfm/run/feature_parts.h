@@ -1,14 +1,15 @@
-// calib/sfm/run/feature_parts.h -- features that several processes found, each in a file of its own.
+// calib/sfm/run/feature_parts.h -- features that several processes found, each in a file of its
+// own.
 #pragma once
 #include <filesystem>
 #include <optional>
 #include <vector>
 
-#include "calib/sfm/run/workspace.h"
 #include "calib/sfm/run/store.h"
+#include "calib/sfm/run/workspace.h"
 #include "dtr/base/part.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 
 /// The note beside a file of features that says how much of it is whole (Workspace::Keep).
 std::filesystem::path NoteOf(const std::filesystem::path& file);
@@ -23,14 +24,14 @@ class FeatureParts {
   FeatureParts(Workspace& workspace, const std::filesystem::path& all);
 
   /// Features of a photo; nothing where no part has them. Called from any thread.
-  std::optional<sfm::Features> Of(size_t photo) const;
+  std::optional<Features> Of(size_t photo) const;
 
   /// Removes the files of all parts, and what else lies beside them.
   void Remove() const;
 
  private:
   std::filesystem::path all_;
-  std::vector<sfm::FeatureFile> parts_;
+  std::vector<FeatureFile> parts_;
 };
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

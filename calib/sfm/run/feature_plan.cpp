@@ -11,7 +11,7 @@
 #include "dtr/base/memory_budget.h"
 #include "dtr/base/order_statistics.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 namespace {
 
 constexpr double kMib = 1024.0 * 1024.0;
@@ -137,4 +137,4 @@ Matching ResolveMatching(Matching matching, size_t images) {
   return images <= kExhaustiveLimit ? Matching::kExhaustive : Matching::kPreselected;
 }
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "calib/sfm/run/sfm.h"
 #include "calib/lens_camera.h"
+#include "calib/sfm/run/sfm.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 
 /// How features are extracted so that memory suffices.
 struct ExtractionPlan {
@@ -73,4 +73,4 @@ using ImagePairs = std::vector<std::pair<size_t, size_t>>;
 /// kAuto resolved for a number of photos; other values unchanged.
 Matching ResolveMatching(Matching matching, size_t images);
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

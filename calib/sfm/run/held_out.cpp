@@ -7,12 +7,12 @@
 #include <mutex>
 #include <optional>
 
+#include "calib/lens_groups.h"
+#include "calib/sfm/registration/register_view.h"
 #include "calib/sfm/run/colmap_steps.h"
 #include "calib/sfm/run/own_steps.h"
 #include "calib/sfm/run/pairs.h"
 #include "calib/sfm/run/sfm_steps.h"
-#include "calib/lens_groups.h"
-#include "calib/sfm/registration/register_view.h"
 #include "calib/sfm/run/store.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/error.h"
@@ -21,7 +21,7 @@
 #include "dtr/base/quiet_progress.h"
 #include "dtr/io/image_io.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 namespace fs = std::filesystem;
 namespace {
 
@@ -116,8 +116,8 @@ void RegisterHere(Workspace& workspace, const Frozen& frozen, SmallSources& smal
                   const fs::path& output) {
   std::map<std::string, const calib::SfmImage*> image_called;
   for (const calib::SfmImage& image : frozen.model.images) image_called[image.name] = &image;
-  const sfm::FeatureFile features(frozen.workspace / sfm::kFeatureFile);
-  std::vector<sfm::SourceView> sources;
+  const FeatureFile features(frozen.workspace / kFeatureFile);
+  std::vector<SourceView> sources;
   for (const size_t i : PartnersOf(workspace, frozen, small)) {
     const auto found = image_called.find(frozen.sources[i].name);
     if (found == image_called.end()) continue;
@@ -125,14 +125,14 @@ void RegisterHere(Workspace& workspace, const Frozen& frozen, SmallSources& smal
         {found->second, &frozen.model.cameras.at(found->second->camera_id), features.Of(i)});
   }
   const GroupLenses start = LensesOf(workspace, {group});
-  const sfm::UnregisteredView view{
+  const UnregisteredView view{
       FeaturesOf(workspace.FileOf(0), workspace.images()[0].mask_file, plan.max_image_size_px,
                  plan.max_features),
       group.camera_id ? frozen.model.cameras.at(*group.camera_id) : start.lenses.front(),
       group.camera_id.has_value(), start.focal_is_known.front()};
   const int min_inliers = frozen.forward_motion ? kMinInliersForward : kMinInliers;
-  auto registered = sfm::RegisterView(view, sources, frozen.model, min_inliers, options.seed,
-                                      workspace.progress());
+  auto registered =
+      RegisterView(view, sources, frozen.model, min_inliers, options.seed, workspace.progress());
   if (!registered) return;
   calib::SfmModel model;
   registered->image.id = registered->image.camera_id = group.camera_id.value_or(1);
@@ -294,4 +294,4 @@ HeldOutResult RegisterHeldOut(const fs::path& images_dir, std::span<const SfmIma
   return result;
 }
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

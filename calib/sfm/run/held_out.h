@@ -8,7 +8,7 @@
 
 #include "calib/sfm/run/sfm.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 
 /// Photos placed in a frozen model. The model itself is untouched: it is not part of the result.
 struct HeldOutResult {
@@ -39,4 +39,4 @@ HeldOutResult RegisterHeldOut(const std::filesystem::path& images_dir,
                               const std::filesystem::path& workspace, const SfmOptions& options,
                               Progress& progress);
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

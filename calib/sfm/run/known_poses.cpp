@@ -4,17 +4,17 @@
 
 #include <algorithm>
 
+#include "calib/sfm/mapping/triangulate.h"
 #include "calib/sfm/run/colmap_steps.h"
 #include "calib/sfm/run/own_steps.h"
 #include "calib/sfm/run/point_colours.h"
 #include "calib/sfm/run/sfm_steps.h"
 #include "calib/sfm/run/view_pyramids.h"
-#include "calib/sfm/mapping/triangulate.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 namespace fs = std::filesystem;
 namespace {
 
@@ -96,13 +96,13 @@ calib::SfmModel TriangulateHere(Workspace& workspace, const KnownCameras& known)
   workspace.progress().Stage("triangulation", 0);
   calib::SfmModel found;
   workspace.RunHere([&] {
-    sfm::ViewGraph graph = ReadGraph(workspace);
+    ViewGraph graph = ReadGraph(workspace);
     std::vector<Pose> poses;
     for (const PosedImage& image : known.images) poses.push_back(image.cam_from_world);
     for (size_t c = 0; c < graph.cameras.size(); ++c) {
       graph.cameras[c] = known.model.cameras.at(static_cast<std::uint32_t>(c + 1));
     }
-    found = sfm::TriangulateMatches(graph, poses, workspace.threads());
+    found = TriangulateMatches(graph, poses, workspace.threads());
     ColourPoints(workspace, found);
   });
   return found;
@@ -133,9 +133,9 @@ void RequireColmapsModels(std::span<const PosedImage> images) {
 
 // All matches that agree with a geometry of their pair.
 std::vector<calib::MatchedPair> MatchesIn(const Workspace& workspace) {
-  const sfm::ViewGraph graph = ReadGraph(workspace);
+  const ViewGraph graph = ReadGraph(workspace);
   std::vector<calib::MatchedPair> pairs;
-  for (const sfm::PairGeometry& pair : graph.pairs) {
+  for (const PairGeometry& pair : graph.pairs) {
     calib::MatchedPair& out = pairs.emplace_back();
     out.a = pair.image_a;
     out.b = pair.image_b;
@@ -210,4 +210,4 @@ SfmResult TriangulateWithPoses(const fs::path& images_dir, std::span<const Posed
   return result;
 }
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

@@ -4,11 +4,11 @@
 #include <span>
 #include <string>
 
-#include "calib/sfm/run/sfm.h"
 #include "calib/lens_camera.h"
+#include "calib/sfm/run/sfm.h"
 #include "dtr/types/pose.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 
 /// A photo with its known camera. The photo may be distorted as `camera` says.
 struct PosedImage {
@@ -40,4 +40,4 @@ std::vector<calib::MatchedPair> MatchWithoutCameras(const std::filesystem::path&
                                                     const std::filesystem::path& workspace,
                                                     const SfmOptions& options, Progress& progress);
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

@@ -10,16 +10,16 @@
 #include "calib/bundle/bundle.h"
 #include "calib/bundle/degeneracy.h"
 #include "calib/bundle/refine.h"
+#include "calib/sfm/mapping/model_check.h"
 #include "calib/sfm/run/colmap_steps.h"
 #include "calib/sfm/run/own_steps.h"
 #include "calib/sfm/run/parallax.h"
 #include "calib/sfm/run/sfm_steps.h"
-#include "calib/sfm/mapping/model_check.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 namespace {
 
 using nlohmann::json;
@@ -77,7 +77,7 @@ std::optional<Doubtful> DropContradicted(Workspace& workspace,
                                          const std::vector<CameraGroup>& groups,
                                          std::vector<calib::SfmModel>& colmaps) {
   if (colmaps.empty()) return std::nullopt;
-  sfm::ViewGraph graph = ReadGraph(workspace);
+  ViewGraph graph = ReadGraph(workspace);
   // What EXIF says contradicts nothing; what pairs voted for does.
   const GroupLenses exif = LensesOf(workspace, groups);
   for (size_t i = 0; i < graph.cameras.size() && i < exif.lenses.size(); ++i) {
@@ -85,7 +85,7 @@ std::optional<Doubtful> DropContradicted(Workspace& workspace,
         exif.focal_is_known[i] && graph.cameras[i].params[0] == exif.lenses[i].params[0];
     if (is_exifs) graph.focal_is_known[i] = 0;
   }
-  std::string why = sfm::WhyContradicted(graph, colmaps.front(), workspace.threads());
+  std::string why = WhyContradicted(graph, colmaps.front(), workspace.threads());
   if (why.empty()) return std::nullopt;
   Doubtful dropped{std::move(colmaps.front()), std::move(why), true};
   colmaps.clear();
@@ -238,7 +238,7 @@ Own MapOwn(Workspace& workspace, const std::vector<CameraGroup>& groups, const S
 // Whether EXIF knows every focal length and no vote of the matches changed one.
 bool AllFocalsAreExifs(const Workspace& workspace, const std::vector<CameraGroup>& groups) {
   const GroupLenses exif = LensesOf(workspace, groups);
-  const sfm::ViewGraph graph = ReadGraph(workspace);
+  const ViewGraph graph = ReadGraph(workspace);
   if (graph.cameras.size() != exif.lenses.size()) return false;
   for (size_t i = 0; i < exif.lenses.size(); ++i) {
     const bool is_exifs =
@@ -272,13 +272,13 @@ bool MayBeExtended(const Workspace& workspace, const calib::SfmModel& model) {
   if (model.images.size() == workspace.images().size()) return false;
   std::set<std::string> names;
   for (const calib::SfmImage& image : model.images) names.insert(image.name);
-  const sfm::ViewGraph graph = ReadGraph(workspace);
+  const ViewGraph graph = ReadGraph(workspace);
   std::vector<char> placed;
-  for (const sfm::GraphImage& image : graph.images) {
+  for (const GraphImage& image : graph.images) {
     placed.push_back(names.contains(image.name));
   }
   std::vector<size_t> matches(placed.size());
-  for (const sfm::PairGeometry& pair : graph.pairs) {
+  for (const PairGeometry& pair : graph.pairs) {
     const auto a = static_cast<size_t>(pair.image_a), b = static_cast<size_t>(pair.image_b);
     if (placed[a]) matches[b] += pair.matches.size();
     if (placed[b]) matches[a] += pair.matches.size();
@@ -382,4 +382,4 @@ void ReadOwnMappingNote(const Workspace& workspace, SfmReport& report) {
   }
 }
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

@@ -5,7 +5,7 @@
 #include "calib/sfm/run/feature_plan.h"
 #include "calib/sfm/run/workspace.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 
 /// Models of the workspace's matches, largest first; none where no photos can be placed. Where a
 /// model of the global mapper does not pass, or the photos do not determine it
@@ -30,4 +30,4 @@ inline constexpr char kOwnMappingNote[] = "own_mapping.json";
 /// Adds to `report` what that file says: the mapper to version, photos to why_not_registered.
 void ReadOwnMappingNote(const Workspace& workspace, SfmReport& report);
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

@@ -7,14 +7,14 @@
 #include <functional>
 #include <map>
 
-#include "calib/sfm/run/feature_parts.h"
-#include "calib/sfm/run/parallax.h"
-#include "calib/sfm/run/point_colours.h"
 #include "calib/models/fisheye.h"
 #include "calib/sfm/features/sift.h"
 #include "calib/sfm/mapping/global_mapper.h"
 #include "calib/sfm/matching/match_photos.h"
 #include "calib/sfm/matching/pair_journal.h"
+#include "calib/sfm/run/feature_parts.h"
+#include "calib/sfm/run/parallax.h"
+#include "calib/sfm/run/point_colours.h"
 #include "calib/sfm/run/store.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/durable.h"
@@ -23,7 +23,7 @@
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/image_io.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 namespace fs = std::filesystem;
 namespace {
 
@@ -89,8 +89,8 @@ std::optional<std::vector<std::pair<int, int>>> PairsFor(const std::vector<SfmIm
   return pairs;
 }
 
-sfm::MatchPart MatchPartOf(const SfmPart& part) {
-  using Stage = sfm::MatchPart::Stage;
+MatchPart MatchPartOf(const SfmPart& part) {
+  using Stage = MatchPart::Stage;
   switch (part.stage) {
     case SfmStage::kMatching:
       return {Stage::kMatching, part.part};
@@ -117,8 +117,8 @@ GroupLenses LensesOf(const Workspace& workspace, const std::vector<CameraGroup>&
   return known;
 }
 
-sfm::Features FeaturesOf(const fs::path& photo, const fs::path& mask_file, int max_image_size_px,
-                         int max_features) {
+Features FeaturesOf(const fs::path& photo, const fs::path& mask_file, int max_image_size_px,
+                    int max_features) {
   const Grid<std::uint8_t> grey =
       GreyOf(io::ReadImage(photo, {.memory_gb = 0}));  // it was written within it
   Mask mask;
@@ -128,16 +128,16 @@ sfm::Features FeaturesOf(const fs::path& photo, const fs::path& mask_file, int m
                             mask_file.string(), grey.width(), grey.height(), mask.width(),
                             mask.height()));
   }
-  sfm::SiftOptions options;
+  SiftOptions options;
   options.max_features = max_features > 0 ? max_features : kMaxOwnFeatures;
   options.max_size_px = max_image_size_px;
-  return sfm::DetectSift(grey.data(), grey.width(), grey.height(), mask.data(), options);
+  return DetectSift(grey.data(), grey.width(), grey.height(), mask.data(), options);
 }
 
 namespace {
 
 // Features of photos, from wherever.
-using FindFeatures = std::function<sfm::Features(size_t image)>;
+using FindFeatures = std::function<Features(size_t image)>;
 
 // Adds those of `images` to a file, of which `kept` is there already.
 void AddInBatches(Workspace& workspace, const fs::path& file, const std::vector<size_t>& images,
@@ -148,14 +148,14 @@ void AddInBatches(Workspace& workspace, const fs::path& file, const std::vector<
   for (size_t begin = kept; begin < images.size(); begin += kPhotosPerBatch) {
     const size_t count = std::min(kPhotosPerBatch, images.size() - begin);
     const std::span batch = std::span(images).subspan(begin, count);
-    std::vector<sfm::Features> features(count);
+    std::vector<Features> features(count);
     workspace.RunHere([&] {
       ParallelFor(0, static_cast<int>(count), plan.threads, [&](int i) {
         workspace.progress().ThrowIfInterrupted();
         features[static_cast<size_t>(i)] = find(batch[static_cast<size_t>(i)]);
         workspace.progress().Update(++done);
       });
-      sfm::FeatureFile::Add(file, batch, features);
+      FeatureFile::Add(file, batch, features);
     });
     workspace.Keep(NoteOf(file), begin + count);
   }
@@ -166,11 +166,11 @@ void AddInBatches(Workspace& workspace, const fs::path& file, const std::vector<
 size_t KeptOrNew(Workspace& workspace, const fs::path& file) {
   const fs::path note = NoteOf(file);
   const size_t kept = fs::exists(file) ? workspace.Kept(note).value_or(0) : 0;
-  if (kept > 0 && sfm::FeatureFile::CutAfter(file, kept)) return kept;
+  if (kept > 0 && FeatureFile::CutAfter(file, kept)) return kept;
   // A note must never meet features of other photos: it goes before a new file comes.
   RemoveTree(note);
   SyncFolder(note.parent_path());
-  sfm::FeatureFile::Create(file);
+  FeatureFile::Create(file);
   return 0;
 }
 
@@ -193,7 +193,7 @@ void RemoveDatabases(Workspace& workspace) {
 
 void OwnFeatures(Workspace& workspace, const std::vector<CameraGroup>& groups,
                  const ExtractionPlan& plan, const std::optional<SfmPart>& part) {
-  const fs::path all = workspace.folder() / sfm::kFeatureFile;
+  const fs::path all = workspace.folder() / kFeatureFile;
   const std::vector<size_t> images = InOrder(groups);
   const FindFeatures detect = [&](size_t image) {
     return FeaturesOf(workspace.FileOf(image), workspace.images()[image].mask_file,
@@ -222,9 +222,9 @@ void OwnFeatures(Workspace& workspace, const std::vector<CameraGroup>& groups,
 void OwnMatches(Workspace& workspace, const std::vector<CameraGroup>& groups, Matching matching,
                 const SfmOptions& options, bool known_lenses,
                 const std::optional<ImagePairs>& allowed) {
-  const sfm::FeatureFile features(workspace.folder() / sfm::kFeatureFile);
+  const FeatureFile features(workspace.folder() / kFeatureFile);
   GroupLenses known = LensesOf(workspace, groups);
-  std::vector<sfm::MatchPhoto> photos;
+  std::vector<MatchPhoto> photos;
   std::vector<int> group_of(workspace.images().size());
   for (size_t g = 0; g < groups.size(); ++g) {
     for (const size_t i : groups[g].images) group_of[i] = static_cast<int>(g);
@@ -234,7 +234,7 @@ void OwnMatches(Workspace& workspace, const std::vector<CameraGroup>& groups, Ma
     photos.push_back({image.name, image.width_px, image.height_px, group_of[i], {}});
     photos.back().features.keypoints = features.KeypointsOf(i);
   }
-  sfm::MatchOptions match;
+  MatchOptions match;
   match.threads = workspace.threads();
   match.seed = options.seed;
   match.lens_is_known.assign(known.lenses.size(), known_lenses);
@@ -249,35 +249,33 @@ void OwnMatches(Workspace& workspace, const std::vector<CameraGroup>& groups, Ma
   if (options.part) match.part = MatchPartOf(*options.part);
   match.progress = &workspace.progress();
   workspace.RunHere([&] {
-    sfm::MatchResult result = sfm::MatchPhotos(photos, known.lenses, known.focal_is_known, match);
+    MatchResult result = MatchPhotos(photos, known.lenses, known.focal_is_known, match);
     for (const std::string& note : result.notes) workspace.progress().Note(note);
-    sfm::WriteMatches(workspace.folder() / sfm::kMatchFile, result.graph);
+    WriteMatches(workspace.folder() / kMatchFile, result.graph);
   });
-  sfm::matching::PairJournal::Remove(match.journal);
+  matching::PairJournal::Remove(match.journal);
 }
 
-sfm::ViewGraph ReadGraph(const Workspace& workspace) {
-  return sfm::ReadMatches(workspace.folder() / sfm::kMatchFile,
-                          sfm::FeatureFile(workspace.folder() / sfm::kFeatureFile),
-                          NamesOf(workspace));
+ViewGraph ReadGraph(const Workspace& workspace) {
+  return ReadMatches(workspace.folder() / kMatchFile,
+                     FeatureFile(workspace.folder() / kFeatureFile), NamesOf(workspace));
 }
 
-sfm::MatchSummary SummaryOf(const Workspace& workspace) {
-  const sfm::ViewGraph graph = ReadGraph(workspace);
-  sfm::MatchSummary summary;
-  for (const sfm::GraphImage& image : graph.images) {
+MatchSummary SummaryOf(const Workspace& workspace) {
+  const ViewGraph graph = ReadGraph(workspace);
+  MatchSummary summary;
+  for (const GraphImage& image : graph.images) {
     summary.features.push_back(static_cast<std::int64_t>(image.pixels.size()));
   }
-  for (const sfm::PairGeometry& pair : graph.pairs) {
+  for (const PairGeometry& pair : graph.pairs) {
     const auto a = static_cast<size_t>(pair.image_a), b = static_cast<size_t>(pair.image_b);
     std::vector<double> moved_px;
     for (const auto& [in_a, in_b] : pair.matches) {
       moved_px.push_back((graph.images[a].pixels[in_a] - graph.images[b].pixels[in_b]).norm());
     }
-    summary.pairs.push_back(
-        {a, b, static_cast<std::int64_t>(pair.matches.size()),
-         pair.kind == sfm::PairKind::kPlanar || pair.kind == sfm::PairKind::kRotation,
-         AreStill(moved_px, workspace.images()[a])});
+    summary.pairs.push_back({a, b, static_cast<std::int64_t>(pair.matches.size()),
+                             pair.kind == PairKind::kPlanar || pair.kind == PairKind::kRotation,
+                             AreStill(moved_px, workspace.images()[a])});
   }
   return summary;
 }
@@ -285,11 +283,11 @@ sfm::MatchSummary SummaryOf(const Workspace& workspace) {
 namespace {
 
 // Gives the graph's images, by their own names, the stations of the workspace's.
-void SetStations(const Workspace& workspace, sfm::ViewGraph* graph) {
+void SetStations(const Workspace& workspace, ViewGraph* graph) {
   std::map<std::string, int> numbers;
   std::map<std::string, const SfmImageInput*> input_of;
   for (const SfmImageInput& input : workspace.images()) input_of[input.name] = &input;
-  for (sfm::GraphImage& image : graph->images) {
+  for (GraphImage& image : graph->images) {
     const SfmImageInput& input = *input_of.at(image.name);
     if (input.station.empty()) continue;
     image.station = numbers.emplace(input.station, static_cast<int>(numbers.size())).first->second;
@@ -301,20 +299,20 @@ void SetStations(const Workspace& workspace, sfm::ViewGraph* graph) {
 
 GloballyMapped MapHere(Workspace& workspace, const SfmOptions& options,
                        const std::optional<GroupLenses>& fixed, bool focals_hold) {
-  sfm::ViewGraph graph = ReadGraph(workspace);
+  ViewGraph graph = ReadGraph(workspace);
   if (fixed) graph.cameras = fixed->lenses;
   SetStations(workspace, &graph);
   GloballyMapped result;
   workspace.RunHere([&] {
-    sfm::Mapped mapped = sfm::MapGlobally(graph, {.threads = workspace.threads(),
-                                                  .seed = options.seed,
-                                                  .intrinsics_are_known = fixed.has_value(),
-                                                  .focals_are_known = focals_hold,
-                                                  .progress = &workspace.progress()});
+    Mapped mapped = MapGlobally(graph, {.threads = workspace.threads(),
+                                        .seed = options.seed,
+                                        .intrinsics_are_known = fixed.has_value(),
+                                        .focals_are_known = focals_hold,
+                                        .progress = &workspace.progress()});
     result.model = std::move(mapped.model);
     ColourPoints(workspace, result.model);
     result.why_not = std::move(mapped.why_not);
-    for (const sfm::LeftOut& left_out : mapped.left_out) {
+    for (const LeftOut& left_out : mapped.left_out) {
       result.why_without_camera[graph.images[static_cast<size_t>(left_out.image)].name] =
           left_out.why;
     }
@@ -322,4 +320,4 @@ GloballyMapped MapHere(Workspace& workspace, const SfmOptions& options,
   return result;
 }
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "calib/sfm/run/feature_plan.h"
-#include "calib/sfm/run/workspace.h"
 #include "calib/sfm/run/match_summary.h"
+#include "calib/sfm/run/workspace.h"
 #include "calib/sfm/view_graph.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 
 /// The lens of each group as far as it is known before photos are matched; the focal length is
 /// EXIF's, or a guess.
@@ -23,8 +23,8 @@ GroupLenses LensesOf(const Workspace& workspace, const std::vector<CameraGroup>&
 /// Features of a photo on its upright grid, none where `mask_file` is black (empty: everywhere).
 /// Of photos with a longer side than max_image_size_px a smaller image is looked at; pixels are the
 /// photo's. Throws Error when a file cannot be read.
-sfm::Features FeaturesOf(const std::filesystem::path& photo, const std::filesystem::path& mask_file,
-                         int max_image_size_px, int max_features);
+Features FeaturesOf(const std::filesystem::path& photo, const std::filesystem::path& mask_file,
+                    int max_image_size_px, int max_features);
 
 /// Among the inputs of the step "features": work that an earlier store holds begins again.
 inline constexpr char kStoreVersion[] = "\nstore 1";
@@ -46,8 +46,8 @@ void OwnMatches(Workspace& workspace, const std::vector<CameraGroup>& groups, Ma
 
 /// The graph that OwnMatches left, images in the workspace's order under their own names. Throws
 /// Error where the store is damaged.
-sfm::ViewGraph ReadGraph(const Workspace& workspace);
-sfm::MatchSummary SummaryOf(const Workspace& workspace);
+ViewGraph ReadGraph(const Workspace& workspace);
+MatchSummary SummaryOf(const Workspace& workspace);
 
 /// What the global mapper made of the workspace's matches.
 struct GloballyMapped {
@@ -61,4 +61,4 @@ struct GloballyMapped {
 GloballyMapped MapHere(Workspace& workspace, const SfmOptions& options,
                        const std::optional<GroupLenses>& fixed = {}, bool focals_hold = false);
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

@@ -13,7 +13,7 @@
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/image_io.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 namespace {
 
 // Squared ratio test on distances (Lowe 2004 uses 0.8); descriptors are unit vectors, so that
@@ -169,4 +169,4 @@ std::vector<size_t> MostResembling(const SmallFeatures& photo,
   return First(ByScore(scores), kNeighbours);
 }
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

@@ -9,7 +9,7 @@
 #include "dtr/base/progress.h"
 #include "dtr/types/grid.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 
 /// Unit-length SIFT descriptors of a small image, 128 numbers each, one per row.
 using SmallFeatures = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -56,4 +56,4 @@ std::vector<SmallFeatures> SmallFeaturesOfFiles(std::span<const std::filesystem:
 std::vector<size_t> MostResembling(const SmallFeatures& photo,
                                    std::span<const SmallFeatures> others);
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 namespace {
 
 // A feature that moved by less than this share of the photo's long side lies at the same position:
@@ -16,11 +16,11 @@ bool HalfOrMore(int part, int whole) { return whole > 0 && 2 * part >= whole; }
 
 }  // namespace
 
-PairCounts CountPairs(const sfm::MatchSummary& matches) {
+PairCounts CountPairs(const MatchSummary& matches) {
   PairCounts counts;
   counts.photos = static_cast<int>(matches.features.size());
   counts.matched = static_cast<int>(matches.pairs.size());
-  for (const sfm::MatchSummary::Pair& pair : matches.pairs) {
+  for (const MatchSummary::Pair& pair : matches.pairs) {
     counts.still += pair.still;
     counts.without_parallax += pair.one_homography;
   }
@@ -78,4 +78,4 @@ std::string WhyNoModel(const PairCounts& counts) {
   return "";
 }
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

@@ -3,10 +3,10 @@
 #include <string>
 #include <vector>
 
-#include "calib/sfm/run/sfm.h"
 #include "calib/sfm/run/match_summary.h"
+#include "calib/sfm/run/sfm.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 
 /// What the matched pairs show.
 struct PairCounts {
@@ -20,7 +20,7 @@ struct PairCounts {
   int still = 0;
 };
 
-PairCounts CountPairs(const sfm::MatchSummary& matches);
+PairCounts CountPairs(const MatchSummary& matches);
 
 /// Of a pair of photos, of which `photo` is the first: half or more of the features moved so little
 /// that they lie at the same position.
@@ -40,4 +40,4 @@ std::string LackOfPairs(const PairCounts& counts);
 /// Why the mapper made no model of these photos, and what helps.
 std::string WhyNoModel(const PairCounts& counts);
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

@@ -7,7 +7,7 @@
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/image_io.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 namespace {
 
 struct ColourSum {
@@ -59,4 +59,4 @@ void ColourPoints(Workspace& workspace, calib::SfmModel& model) {
   }
 }
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

@@ -2,10 +2,10 @@
 #pragma once
 #include "calib/sfm/run/workspace.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 
 /// Gives each point the mean colour (sRGB values, as COLMAP does) of the pixels where its images,
 /// under the workspace's own names, observe it. Each photo is read once, several at a time.
 void ColourPoints(Workspace& workspace, calib::SfmModel& model);
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "calib/sfm/mapping/model_check.h"
+#include "calib/sfm/mapping/triangulate.h"
 #include "calib/sfm/run/colmap_steps.h"
 #include "calib/sfm/run/own_mapping.h"
 #include "calib/sfm/run/own_steps.h"
@@ -12,20 +14,18 @@
 #include "calib/sfm/run/point_colours.h"
 #include "calib/sfm/run/sfm_steps.h"
 #include "calib/sfm/run/without_camera.h"
-#include "calib/sfm/mapping/model_check.h"
-#include "calib/sfm/mapping/triangulate.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/parallel_for.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 namespace fs = std::filesystem;
 namespace {
 
 constexpr std::uintmax_t kLargestSizes = 1 << 20;
 
-[[noreturn]] void ThrowNoModel(const Workspace& workspace, const sfm::MatchSummary& matches) {
+[[noreturn]] void ThrowNoModel(const Workspace& workspace, const MatchSummary& matches) {
   const std::string log = workspace.Report().steps.back().log_file.string();
   if (const std::string why = WhyNoModel(CountPairs(matches)); !why.empty()) {
     throw Error(fmt::format("colmap mapper: no model of {} photos: {}; see {}",
@@ -119,7 +119,7 @@ SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> imag
   }
   if (options.folder_is_shared) return result;  // who is alone says what follows
   try {
-    const sfm::MatchSummary matches = MatchedIn(workspace, options);
+    const MatchSummary matches = MatchedIn(workspace, options);
     const PairCounts pairs = CountPairs(matches);
     result.report.lack_of_parallax = LackOfParallax(pairs);
     if (result.report.lack_of_parallax.empty()) {
@@ -145,20 +145,20 @@ calib::SfmModel PointsOfMatches(const fs::path& images_dir, std::span<const SfmI
                                 Progress& progress) {
   Workspace workspace(workspace_folder, images_dir, images, "", ResolveThreads(options.threads),
                       progress, VersionOf(options), options.folder_is_shared);
-  sfm::ViewGraph graph = ReadGraph(workspace);
+  ViewGraph graph = ReadGraph(workspace);
   std::vector<Pose> poses;
   std::vector<bool> posed;
-  for (const sfm::GraphImage& image : graph.images) {
+  for (const GraphImage& image : graph.images) {
     const auto found = cam_from_world.find(image.name);
     posed.push_back(found != cam_from_world.end());
     poses.push_back(posed.back() ? found->second : Pose{});
   }
   for (calib::LensCamera& camera : graph.cameras) camera = lens;
-  std::erase_if(graph.pairs, [&](const sfm::PairGeometry& pair) {
+  std::erase_if(graph.pairs, [&](const PairGeometry& pair) {
     return !posed[static_cast<size_t>(pair.image_a)] || !posed[static_cast<size_t>(pair.image_b)];
   });
-  calib::SfmModel model = sfm::TriangulateMatches(graph, poses, workspace.threads());
-  if (const std::string why = sfm::WhyRigsContradicted(graph, model, workspace.threads());
+  calib::SfmModel model = TriangulateMatches(graph, poses, workspace.threads());
+  if (const std::string why = WhyRigsContradicted(graph, model, workspace.threads());
       !why.empty()) {
     throw Error(fmt::format(
         "structure from motion: expected panoramas that determine their cameras, found that {}; "
@@ -194,4 +194,4 @@ std::optional<SfmResult> MapWithFixedIntrinsics(const fs::path& images_dir,
   return result;
 }
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

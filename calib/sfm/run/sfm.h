@@ -13,7 +13,7 @@
 #include "dtr/base/part.h"
 #include "dtr/base/progress.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 
 class ColmapSteps;  // colmap_steps.h
 
@@ -187,4 +187,4 @@ calib::SfmModel PointsOfMatches(const std::filesystem::path& images_dir,
 /// Mean distance (px) between features and their points' projections; 0 without observations.
 double MeanReprojectionErrorPx(const calib::SfmModel& model);
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

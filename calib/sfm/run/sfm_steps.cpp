@@ -9,7 +9,7 @@
 #include "calib/sfm/run/own_steps.h"
 #include "dtr/base/error.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 namespace {
 
 // What the features depend on beside the photos.
@@ -40,7 +40,7 @@ std::string VersionOf(const SfmOptions& options) {
   return options.engine == SfmEngine::kColmap ? options.colmap->Version() : kOwnVersion;
 }
 
-sfm::MatchSummary MatchedIn(const Workspace& workspace, const SfmOptions& options) {
+MatchSummary MatchedIn(const Workspace& workspace, const SfmOptions& options) {
   return options.engine == SfmEngine::kColmap ? options.colmap->Matched(workspace)
                                               : SummaryOf(workspace);
 }
@@ -108,4 +108,4 @@ double MeanReprojectionErrorPx(const calib::SfmModel& model) {
   return count > 0 ? sum / static_cast<double>(count) : 0;
 }
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

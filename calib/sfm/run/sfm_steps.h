@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "calib/sfm/run/feature_plan.h"
-#include "calib/sfm/run/workspace.h"
 #include "calib/sfm/run/match_summary.h"
+#include "calib/sfm/run/workspace.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 
 /// The lens model of the options. Throws UsageError on an unknown name.
 calib::CameraModel CameraModelOf(const SfmOptions& options);
@@ -19,7 +19,7 @@ calib::CameraModel CameraModelOf(const SfmOptions& options);
 std::string VersionOf(const SfmOptions& options);
 
 /// What matching found, by whatever engine.
-sfm::MatchSummary MatchedIn(const Workspace& workspace, const SfmOptions& options);
+MatchSummary MatchedIn(const Workspace& workspace, const SfmOptions& options);
 
 /// Steps "features" and "matches" of the workspace. What was planned goes to `report`.
 /// Of the pairs that options.matching names only those of `allowed` (a < b, sorted; numbers of
@@ -41,4 +41,4 @@ inline constexpr char kFixedIntrinsicsNote[] = "fixed_intrinsics";
 /// Points that must agree with the place of a photo: COLMAP's own limit, and that of such a walk.
 inline constexpr int kMinInliers = 30, kMinInliersForward = 15;
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <vector>
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 namespace {
 
 using Eigen::Vector3d;
@@ -64,4 +64,4 @@ ImagePairs PairsThatMayOverlap(std::span<const PosedImage> images) {
   return pairs;
 }
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

@@ -5,7 +5,7 @@
 #include "calib/sfm/run/feature_plan.h"
 #include "calib/sfm/run/known_poses.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 
 /// True where no point lies in both photos, however far off: a plane separates their pyramids of
 /// view, which are taken larger than the images by kPyramidMargin of their size on every side, for
@@ -16,4 +16,4 @@ inline constexpr double kPyramidMargin = 0.05;
 /// Pairs (a < b, sorted) of images for which CannotOverlap is false.
 ImagePairs PairsThatMayOverlap(std::span<const PosedImage> images);
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

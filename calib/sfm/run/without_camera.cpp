@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 namespace {
 
 /// COLMAP forgets pairs that have fewer features in common (TwoViewGeometry.min_num_inliers).
@@ -56,13 +56,13 @@ std::string Reason(std::int64_t features, const InCommon& common, int min_common
 }  // namespace
 
 std::map<std::string, std::string> WhyWithoutCamera(const Workspace& workspace,
-                                                    const sfm::MatchSummary& matches,
+                                                    const MatchSummary& matches,
                                                     const calib::SfmModel& model, int min_common) {
   std::set<std::string> registered;
   for (const calib::SfmImage& image : model.images) registered.insert(image.name);
   const auto& images = workspace.images();
   std::vector<InCommon> in_common(images.size());
-  for (const sfm::MatchSummary::Pair& pair : matches.pairs) {
+  for (const MatchSummary::Pair& pair : matches.pairs) {
     for (const auto& [mine, theirs] : {std::pair(pair.a, pair.b), std::pair(pair.b, pair.a)}) {
       const std::string& name = images[theirs].name;
       InCommon& known = in_common[mine];
@@ -77,4 +77,4 @@ std::map<std::string, std::string> WhyWithoutCamera(const Workspace& workspace,
   return reasons;
 }
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

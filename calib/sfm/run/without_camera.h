@@ -3,17 +3,17 @@
 #include <map>
 #include <string>
 
-#include "calib/sfm/run/workspace.h"
 #include "calib/sfm/run/match_summary.h"
+#include "calib/sfm/run/workspace.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 
 /// For every photo of the workspace that is not in the `model` a clause, by the photo's
 /// name, that says what it has in common with others: nothing at all, only with photos that have no
 /// camera either, or too little for COLMAP, which places a photo by `min_common` of its features
 /// that are points already (Mapper.abs_pose_min_num_inliers).
 std::map<std::string, std::string> WhyWithoutCamera(const Workspace& workspace,
-                                                    const sfm::MatchSummary& matches,
+                                                    const MatchSummary& matches,
                                                     const calib::SfmModel& model, int min_common);
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

@@ -15,7 +15,7 @@
 #include "dtr/base/hash.h"
 #include "dtr/base/machine.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 namespace fs = std::filesystem;
 using nlohmann::json;
 namespace {
@@ -339,4 +339,4 @@ void WriteReport(const fs::path& folder, const SfmReport& report) {
                       j.dump(1, ' ', false, json::error_handler_t::replace) + "\n");
 }
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

@@ -10,7 +10,7 @@
 
 #include "calib/sfm/run/sfm.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 
 /// Layout: images/ (links under plain names, see AliasOf), images.json (which link is which photo),
 /// hashes.json (of the photos, by size and time),
@@ -92,4 +92,4 @@ void WriteReport(const std::filesystem::path& folder, const SfmReport& report);
 /// Makes a folder with its parents. Throws Error when it cannot.
 void MakeFolder(const std::filesystem::path& path);
 
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

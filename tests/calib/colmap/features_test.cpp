@@ -11,6 +11,8 @@
 namespace dtr::colmap {
 namespace {
 
+using namespace sfm;
+
 namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;

@@ -10,9 +10,9 @@
 #include <numbers>
 
 #include "calib/colmap/export.h"
-#include "calib/sfm/run/held_out.h"
 #include "calib/colmap/model_io.h"
 #include "calib/colmap/steps.h"
+#include "calib/sfm/run/held_out.h"
 #include "calib/sfm/run/view_pyramids.h"
 #include "calib/sfm/run/workspace.h"
 #include "dtr/base/error.h"
@@ -25,6 +25,8 @@
 
 namespace dtr::colmap {
 namespace {
+
+using namespace sfm;
 
 namespace fs = std::filesystem;
 using ::testing::AllOf;

@@ -8,8 +8,8 @@
 #include <random>
 
 #include "calib/colmap/model_io.h"
-#include "calib/sfm/run/sfm.h"
 #include "calib/colmap/steps.h"
+#include "calib/sfm/run/sfm.h"
 #include "calib/sfm/run/workspace.h"
 #include "datasets/hard/hard_sets.h"
 #include "dtr/base/error.h"
@@ -24,6 +24,8 @@
 
 namespace dtr::colmap {
 namespace {
+
+using namespace sfm;
 
 using namespace testing;
 namespace fs = std::filesystem;

@@ -2,11 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "calib/colmap/model_io.h"
+#include "calib/colmap/steps.h"
 #include "calib/sfm/run/held_out.h"
 #include "calib/sfm/run/known_poses.h"
-#include "calib/colmap/model_io.h"
 #include "calib/sfm/run/sfm.h"
-#include "calib/colmap/steps.h"
 #include "dtr/base/process.h"
 #include "tests/calib/colmap/model_test_support.h"
 #include "tests/calib/colmap/plaza_truth.h"
@@ -14,6 +14,8 @@
 
 namespace dtr::colmap {
 namespace {
+
+using namespace sfm;
 
 using namespace testing;
 

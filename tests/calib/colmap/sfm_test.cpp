@@ -8,9 +8,9 @@
 #include <mutex>
 
 #include "calib/colmap/features.h"
-#include "calib/sfm/run/held_out.h"
 #include "calib/colmap/matching.h"
 #include "calib/colmap/model_io.h"
+#include "calib/sfm/run/held_out.h"
 #include "calib/sfm/run/workspace.h"
 #include "dtr/base/error.h"
 #include "dtr/io/image_io.h"
@@ -20,6 +20,8 @@
 
 namespace dtr::colmap {
 namespace {
+
+using namespace sfm;
 
 namespace fs = std::filesystem;
 using ::testing::AllOf;

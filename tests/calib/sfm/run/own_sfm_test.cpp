@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <random>
 
+#include "calib/colmap/steps.h"
 #include "calib/sfm/run/held_out.h"
 #include "calib/sfm/run/sfm.h"
-#include "calib/colmap/steps.h"
 #include "dtr/io/image_io.h"
 #include "tests/calib/colmap/model_test_support.h"
 #include "tests/calib/colmap/plaza_truth.h"
@@ -15,10 +15,10 @@
 #include "tests/support/message_of.h"
 #include "tests/support/test_data.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 namespace {
 
-using namespace testing;
+using namespace colmap::testing;
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -26,7 +26,7 @@ using ::testing::IsEmpty;
 class OwnSfm : public ::testing::Test {
  protected:
   OwnSfm() : truth_(PlazaTruth()) {
-    options_.colmap = &Steps();
+    options_.colmap = &colmap::Steps();
     options_.engine = SfmEngine::kGlobal;
     options_.max_image_size_px = kSidePx;
     options_.lens_model = "SIMPLE_PINHOLE";
@@ -130,4 +130,4 @@ TEST_F(OwnSfm, RefusesPhotosThatHaveNothingInCommon) {
 }
 
 }  // namespace
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm

@@ -11,7 +11,7 @@
 #include "dtr/io/image_io.h"
 #include "tests/support/test_data.h"
 
-namespace dtr::colmap {
+namespace dtr::sfm {
 namespace {
 
 namespace fs = std::filesystem;
@@ -94,4 +94,4 @@ TEST(ResolveMatching, PreselectsBeyondTheExhaustiveLimit) {
 }
 
 }  // namespace
-}  // namespace dtr::colmap
+}  // namespace dtr::sfm
