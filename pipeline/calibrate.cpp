@@ -174,7 +174,7 @@ std::vector<sfm::SfmImageInput> SfmInputs(const capture::Capture& capture,
 
 sfm::SfmOptions SfmOptionsFor(const CalibrateOptions& options) {
   sfm::SfmOptions sfm;
-  sfm.colmap = &colmap::Steps();
+  sfm.colmap = &colmap::kSteps;
   sfm.engine = options.sfm.engine;
   sfm.threads = options.threads;
   sfm.seed = options.seed;

@@ -125,8 +125,7 @@ void RequireCuda() {
 
 sfm::StepRecord RunPatchMatchStereo(const fs::path& workspace, Progress& progress) {
   RequireCuda();
-  Program program;
-  Arguments arguments(program, "patch_match_stereo");
+  Arguments arguments("patch_match_stereo");
   arguments.Add({"workspace_path"}, workspace.string());
   arguments.Add({"PatchMatchStereo.geom_consistency"}, "1");
   sfm::StepRecord record;

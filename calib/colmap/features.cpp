@@ -35,15 +35,15 @@ std::optional<std::uint32_t> CameraOf(const sfm::Workspace& workspace,
 }
 
 // `camera_id`: the group's in the database, where it has one.
-Arguments ExtractorArguments(Program& program, sfm::Workspace& workspace,
-                             const std::filesystem::path& database, const sfm::CameraGroup& group,
-                             const ExtractionRun& run, std::optional<std::uint32_t> camera_id,
+Arguments ExtractorArguments(sfm::Workspace& workspace, const std::filesystem::path& database,
+                             const sfm::CameraGroup& group, const ExtractionRun& run,
+                             std::optional<std::uint32_t> camera_id,
                              const sfm::ExtractionPlan& plan, std::uint64_t seed) {
   std::vector<std::string> names;
   for (const size_t i : run.images) names.push_back(workspace.AliasOf(i));
   const auto list =
       workspace.WriteList(fmt::format("camera_{:04}_{:06}.txt", run.group, run.images[0]), names);
-  Arguments arguments(program, "feature_extractor");
+  Arguments arguments("feature_extractor");
   arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", seed))
       .Add({"database_path"}, database.string())
       .Add({"image_path"}, workspace.images_folder().string())
@@ -79,8 +79,7 @@ size_t PhotosIn(const std::vector<ExtractionRun>& batch) {
 }
 
 // `before`: photos of the groups whose features the database holds already.
-void ExtractBatch(Program& program, sfm::Workspace& workspace,
-                  const std::filesystem::path& database,
+void ExtractBatch(sfm::Workspace& workspace, const std::filesystem::path& database,
                   const std::vector<sfm::CameraGroup>& groups,
                   const std::vector<ExtractionRun>& batch, const sfm::ExtractionPlan& plan,
                   std::uint64_t seed, size_t before) {
@@ -89,8 +88,7 @@ void ExtractBatch(Program& program, sfm::Workspace& workspace,
     const sfm::CameraGroup& group = groups[run.group];
     auto camera_id = group.camera_id;
     if (!camera_id && before > 0) camera_id = CameraOf(workspace, database, group);
-    RunStep(workspace,
-            ExtractorArguments(program, workspace, database, group, run, camera_id, plan, seed),
+    RunStep(workspace, ExtractorArguments(workspace, database, group, run, camera_id, plan, seed),
             [&](const std::string& line) {
               if (line.find("Processed file [") != std::string::npos) {
                 workspace.progress().Update(++done);
@@ -122,20 +120,18 @@ std::vector<std::vector<ExtractionRun>> InBatches(const std::vector<sfm::CameraG
   return batches;
 }
 
-void ExtractFeatures(Program& program, sfm::Workspace& workspace,
-                     const std::filesystem::path& database,
+void ExtractFeatures(sfm::Workspace& workspace, const std::filesystem::path& database,
                      const std::vector<sfm::CameraGroup>& groups, const sfm::ExtractionPlan& plan,
                      std::uint64_t seed) {
   workspace.progress().Stage("features", static_cast<int>(workspace.images().size()));
   size_t before = 0;
   for (const auto& batch : InBatches(groups)) {
-    ExtractBatch(program, workspace, database, groups, batch, plan, seed, before);
+    ExtractBatch(workspace, database, groups, batch, plan, seed, before);
     before += PhotosIn(batch);
   }
 }
 
-void ExtractFeaturesResumably(Program& program, sfm::Workspace& workspace,
-                              const std::filesystem::path& database,
+void ExtractFeaturesResumably(sfm::Workspace& workspace, const std::filesystem::path& database,
                               const std::vector<sfm::CameraGroup>& groups,
                               const sfm::ExtractionPlan& plan, std::uint64_t seed) {
   const std::filesystem::path working = database.string() + ".working",
@@ -157,7 +153,7 @@ void ExtractFeaturesResumably(Program& program, sfm::Workspace& workspace,
       // COLMAP writes photo by photo, and cameras before their photos: what it leaves when it is
       // stopped is thrown away, and only whole batches go on.
       before == 0 ? RemoveDatabase(working) : CopyDatabase(database, working);
-      ExtractBatch(program, workspace, working, groups, batch, plan, seed, before);
+      ExtractBatch(workspace, working, groups, batch, plan, seed, before);
       MoveDatabase(working, database);
       workspace.Keep(note, after);
     }

@@ -22,15 +22,13 @@ std::vector<std::vector<ExtractionRun>> InBatches(const std::vector<sfm::CameraG
 /// Extracts into `database`, one extractor run per group or part of one; parts of a group share the
 /// camera that its first made. Throws as RunStep, and Error when a photo could not be read
 /// by COLMAP.
-void ExtractFeatures(Program& program, sfm::Workspace& workspace,
-                     const std::filesystem::path& database,
+void ExtractFeatures(sfm::Workspace& workspace, const std::filesystem::path& database,
                      const std::vector<sfm::CameraGroup>& groups, const sfm::ExtractionPlan& plan,
                      std::uint64_t seed);
 
 /// The same, batch by batch: after each, `database` holds it whole, and an interrupted extraction
 /// of a workspace with the same fingerprint goes on after the last of them.
-void ExtractFeaturesResumably(Program& program, sfm::Workspace& workspace,
-                              const std::filesystem::path& database,
+void ExtractFeaturesResumably(sfm::Workspace& workspace, const std::filesystem::path& database,
                               const std::vector<sfm::CameraGroup>& groups,
                               const sfm::ExtractionPlan& plan, std::uint64_t seed);
 

@@ -1,12 +1,15 @@
-#include "calib/colmap/mapper.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cstdio>
 
+#include "calib/colmap/graph_database.h"
+#include "calib/colmap/program.h"
+#include "calib/colmap/steps.h"
 #include "calib/colmap/workspace_files.h"
+#include "calib/sfm/run/own_steps.h"
 #include "calib/sfm/run/sfm_steps.h"
+#include "calib/sfm/run/store.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -38,9 +41,9 @@ enum class Mapping {
 
 // Runs the mapper; false where it found no two photos to start from, which COLMAP takes for an
 // error: it is a finding about the photos.
-bool RunMapper(Program& program, sfm::Workspace& workspace, const fs::path& models,
-               std::uint64_t seed, Mapping mapping) {
-  Arguments arguments(program, "mapper");
+bool RunMapper(sfm::Workspace& workspace, const fs::path& models, std::uint64_t seed,
+               Mapping mapping) {
+  Arguments arguments("mapper");
   arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", seed))
       .AddIfKnown({"Mapper.random_seed"}, fmt::format("{}", seed))
       .Add({"database_path"}, DatabaseOf(workspace).string())
@@ -86,17 +89,15 @@ std::vector<calib::SfmModel> ModelsIn(const sfm::Workspace& workspace, const fs:
   return models;
 }
 
-std::vector<calib::SfmModel> MadeIn(Program& program, sfm::Workspace& workspace,
-                                    const fs::path& models, const sfm::SfmOptions& options,
-                                    Mapping mapping) {
+std::vector<calib::SfmModel> MadeIn(sfm::Workspace& workspace, const fs::path& models,
+                                    const sfm::SfmOptions& options, Mapping mapping) {
   RemoveTree(models);
   sfm::MakeFolder(models);
   if (options.intrinsics_are_known && mapping == Mapping::kFree) {
     mapping = Mapping::kFixedIntrinsics;
   }
-  return RunMapper(program, workspace, models, options.seed, mapping)
-             ? ModelsIn(workspace, models)
-             : std::vector<calib::SfmModel>();
+  return RunMapper(workspace, models, options.seed, mapping) ? ModelsIn(workspace, models)
+                                                             : std::vector<calib::SfmModel>();
 }
 
 size_t PhotosOf(const std::vector<calib::SfmModel>& made) {
@@ -105,8 +106,7 @@ size_t PhotosOf(const std::vector<calib::SfmModel>& made) {
 
 // What the mapper makes of photos of which it made `free`, nothing or little, with free intrinsics;
 // `free` where that is no more.
-std::vector<calib::SfmModel> MadeOtherwise(Program& program, sfm::Workspace& workspace,
-                                           const fs::path& models,
+std::vector<calib::SfmModel> MadeOtherwise(sfm::Workspace& workspace, const fs::path& models,
                                            const std::vector<sfm::CameraGroup>& groups,
                                            const sfm::SfmOptions& options,
                                            std::vector<calib::SfmModel> free) {
@@ -115,7 +115,7 @@ std::vector<calib::SfmModel> MadeOtherwise(Program& program, sfm::Workspace& wor
   if (sfm::AllHavePriors(groups)) {
     workspace.progress().Note(
         "COLMAP made no model with free focal lengths; trying with those of EXIF, fixed");
-    fixed = MadeIn(program, workspace, models, options, Mapping::kFixedIntrinsics);
+    fixed = MadeIn(workspace, models, options, Mapping::kFixedIntrinsics);
   }
   std::vector<calib::SfmModel> forward;
   if (static_cast<double>(PhotosOf(fixed)) <
@@ -123,7 +123,7 @@ std::vector<calib::SfmModel> MadeOtherwise(Program& program, sfm::Workspace& wor
     workspace.progress().Note(
         "COLMAP found no two photos to start from; trying two that may lie in line with what they "
         "see");
-    forward = MadeIn(program, workspace, models, options, Mapping::kForwardMotion);
+    forward = MadeIn(workspace, models, options, Mapping::kForwardMotion);
   }
   const bool take_fixed = PhotosOf(fixed) > PhotosOf(forward);
   std::vector<calib::SfmModel>& made = take_fixed ? fixed : forward;
@@ -133,34 +133,43 @@ std::vector<calib::SfmModel> MadeOtherwise(Program& program, sfm::Workspace& wor
   return std::move(made);
 }
 
+// Makes a database of the workspace's features and matches for as long as it lives, where COLMAP
+// did not make it.
+class MappedDatabase {
+ public:
+  MappedDatabase(const sfm::Workspace& workspace, const sfm::SfmOptions& options) {
+    if (options.engine == sfm::SfmEngine::kColmap) return;
+    sfm::ViewGraph graph = sfm::ReadGraph(workspace);
+    for (size_t i = 0; i < graph.images.size(); ++i) graph.images[i].name = workspace.AliasOf(i);
+    made_ = DatabaseOf(workspace);
+    WriteGraphDatabase(made_, graph, sfm::FeatureFile(workspace.folder() / sfm::kFeatureFile));
+  }
+  ~MappedDatabase() { TryRemoveFile(made_); }
+
+ private:
+  fs::path made_;
+};
+
 }  // namespace
 
-std::vector<calib::SfmModel> MapByColmap(sfm::Workspace& workspace,
-                                         const std::vector<sfm::CameraGroup>& groups,
-                                         const sfm::SfmOptions& options) {
-  Program program;
+std::vector<calib::SfmModel> Steps::Map(sfm::Workspace& workspace,
+                                        const std::vector<sfm::CameraGroup>& groups,
+                                        const sfm::SfmOptions& options) const {
+  const MappedDatabase database(workspace, options);
   const fs::path models = workspace.folder() / "models";
-  auto made = MadeIn(program, workspace, models, options, Mapping::kFree);
+  auto made = MadeIn(workspace, models, options, Mapping::kFree);
   // COLMAP 3.10 leaves the two photos that it began with, to which none could be added; 3.8
   // nothing.
   const bool none = PhotosOf(made) <= 2 && PhotosOf(made) < workspace.images().size();
-  return none ? MadeOtherwise(program, workspace, models, groups, options, std::move(made)) : made;
+  return none ? MadeOtherwise(workspace, models, groups, options, std::move(made)) : made;
 }
 
-std::optional<calib::SfmModel> MapFixedByColmap(sfm::Workspace& workspace,
-                                                const sfm::SfmOptions& options) {
-  Program program;
-  auto made = MadeIn(program, workspace, workspace.folder() / "fixed" / "models", options,
+std::optional<calib::SfmModel> Steps::MapFixed(sfm::Workspace& workspace,
+                                               const sfm::SfmOptions& options) const {
+  auto made = MadeIn(workspace, workspace.folder() / "fixed" / "models", options,
                      Mapping::kFixedIntrinsics);
   if (made.empty()) return std::nullopt;
   return std::move(made.front());
-}
-
-void AllowForwardMotion(Arguments& arguments) {
-  arguments.AddIfKnown({"Mapper.init_max_forward_motion"}, "1")
-      .AddIfKnown({"Mapper.init_min_tri_angle"}, "2")
-      .AddIfKnown({"Mapper.filter_min_tri_angle"}, "0.5")
-      .AddIfKnown({"Mapper.abs_pose_min_num_inliers"}, std::to_string(sfm::kMinInliersForward));
 }
 
 }  // namespace dtr::colmap

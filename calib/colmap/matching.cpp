@@ -17,9 +17,9 @@ constexpr int kBlockPhotos = 10;
 constexpr int kSequentialOverlap = 10;
 constexpr double kMatcherGib = 0.5;
 
-Arguments MatcherArguments(Program& program, const char* command,
-                           const std::filesystem::path& database, int threads, std::uint64_t seed) {
-  Arguments arguments(program, command);
+Arguments MatcherArguments(const char* command, const std::filesystem::path& database, int threads,
+                           std::uint64_t seed) {
+  Arguments arguments(command);
   arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", seed))
       .Add({"database_path"}, database.string())
       .Add({"SiftMatching.use_gpu", "FeatureMatching.use_gpu"}, "0")
@@ -89,18 +89,18 @@ int MatchingPercent(const std::string& line) {
                           (static_cast<double>(rows) * columns));
 }
 
-void MatchPairs(Program& program, sfm::Workspace& workspace, const std::filesystem::path& database,
+void MatchPairs(sfm::Workspace& workspace, const std::filesystem::path& database,
                 const std::vector<std::pair<std::string, std::string>>& pairs, int threads,
                 std::uint64_t seed) {
   std::vector<std::string> lines;
   for (const auto& [a, b] : pairs) lines.push_back(a + " " + b);
-  Arguments arguments = MatcherArguments(program, "matches_importer", database, threads, seed);
+  Arguments arguments = MatcherArguments("matches_importer", database, threads, seed);
   arguments.Add({"match_list_path"}, workspace.WriteList("pairs.txt", lines).string())
       .Add({"match_type"}, "pairs");
   RunMatcher(workspace, arguments);
 }
 
-void MatchPhotos(Program& program, sfm::Workspace& workspace, const std::filesystem::path& database,
+void MatchPhotos(sfm::Workspace& workspace, const std::filesystem::path& database,
                  sfm::Matching matching, double memory_gb, std::uint64_t seed,
                  const std::optional<sfm::ImagePairs>& allowed) {
   const int threads = MatchingThreads(workspace.threads(), memory_gb);
@@ -108,12 +108,12 @@ void MatchPhotos(Program& program, sfm::Workspace& workspace, const std::filesys
     std::vector<std::pair<std::string, std::string>> names;
     for (const auto& [a, b] : *pairs)
       names.emplace_back(workspace.AliasOf(a), workspace.AliasOf(b));
-    MatchPairs(program, workspace, database, names, threads, seed);
+    MatchPairs(workspace, database, names, threads, seed);
     return;
   }
   const bool sequential = matching == sfm::Matching::kSequential;
-  Arguments arguments = MatcherArguments(
-      program, sequential ? "sequential_matcher" : "exhaustive_matcher", database, threads, seed);
+  Arguments arguments = MatcherArguments(sequential ? "sequential_matcher" : "exhaustive_matcher",
+                                         database, threads, seed);
   if (sequential) {
     arguments.Add({"SequentialMatching.overlap"}, std::to_string(kSequentialOverlap))
         .Add({"SequentialMatching.quadratic_overlap"}, "1");

@@ -12,12 +12,12 @@ namespace dtr::colmap {
 /// Matches the photos of `database`; an interrupted call may be repeated on the same database. Of
 /// the pairs that `matching` names only those of `allowed`, where it is given. Threads, and photos
 /// held at a time, are bounded by `memory_gb` (GB of 1e9 bytes).
-void MatchPhotos(Program& program, sfm::Workspace& workspace, const std::filesystem::path& database,
+void MatchPhotos(sfm::Workspace& workspace, const std::filesystem::path& database,
                  sfm::Matching matching, double memory_gb, std::uint64_t seed,
                  const std::optional<sfm::ImagePairs>& allowed = {});
 
 /// Matches listed pairs of photos, given by their names in the database.
-void MatchPairs(Program& program, sfm::Workspace& workspace, const std::filesystem::path& database,
+void MatchPairs(sfm::Workspace& workspace, const std::filesystem::path& database,
                 const std::vector<std::pair<std::string, std::string>>& pairs, int threads,
                 std::uint64_t seed);
 

@@ -5,6 +5,7 @@
 
 #include <sstream>
 
+#include "calib/sfm/run/sfm_steps.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/process.h"
@@ -118,8 +119,7 @@ const char* Program::FindOption(const std::string& command,
   return nullptr;
 }
 
-Arguments::Arguments(Program& program, const std::string& command)
-    : program_(program), command_(command), argv_{kProgram, command} {}
+Arguments::Arguments(const std::string& command) : command_(command), argv_{kProgram, command} {}
 
 Arguments& Arguments::Add(std::initializer_list<const char*> names, const std::string& value) {
   const char* name = program_.FindOption(command_, names);
@@ -137,6 +137,13 @@ Arguments& Arguments::Add(std::initializer_list<const char*> names, const std::s
 Arguments& Arguments::AddIfKnown(std::initializer_list<const char*> names,
                                  const std::string& value) {
   return program_.FindOption(command_, names) == nullptr ? *this : Add(names, value);
+}
+
+void AllowForwardMotion(Arguments& arguments) {
+  arguments.AddIfKnown({"Mapper.init_max_forward_motion"}, "1")
+      .AddIfKnown({"Mapper.init_min_tri_angle"}, "2")
+      .AddIfKnown({"Mapper.filter_min_tri_angle"}, "0.5")
+      .AddIfKnown({"Mapper.abs_pose_min_num_inliers"}, std::to_string(sfm::kMinInliersForward));
 }
 
 void RunColmap(const std::vector<std::string>& argv, sfm::StepRecord& record,

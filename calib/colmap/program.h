@@ -40,7 +40,7 @@ class Program {
 /// An argument list for one command, checked against what this COLMAP understands.
 class Arguments {
  public:
-  Arguments(Program& program, const std::string& command);
+  explicit Arguments(const std::string& command);
 
   /// Adds `--name value`; of several names (oldest first) the one this version understands.
   /// Throws Error when it understands none.
@@ -51,10 +51,16 @@ class Arguments {
   const std::vector<std::string>& argv() const { return argv_; }
 
  private:
-  Program& program_;
+  Program program_;
   std::string command_;
   std::vector<std::string> argv_;
 };
+
+/// COLMAP starts from two photos that see the scene from 16 degrees apart, or 4 where it finds
+/// none, and not along the line of sight. A walk straight ahead through a street has no such pair.
+/// Its points are seen under small angles throughout, so they are kept under smaller ones, too, and
+/// fewer of them must agree with a pose. Adds, of what says so, the options that the command has.
+void AllowForwardMotion(Arguments& arguments);
 
 /// Runs COLMAP once, its output going to `record.log_file` and line by line to `on_line`. The rest
 /// of `record` but its name is filled in, also when this throws.

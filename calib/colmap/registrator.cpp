@@ -2,10 +2,10 @@
 
 #include "calib/colmap/database.h"
 #include "calib/colmap/features.h"
-#include "calib/colmap/mapper.h"
 #include "calib/colmap/matching.h"
 #include "calib/colmap/model_io.h"
-#include "calib/colmap/placement.h"
+#include "calib/colmap/program.h"
+#include "calib/colmap/steps.h"
 #include "calib/colmap/workspace_files.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/error.h"
@@ -23,15 +23,14 @@ void WriteAliased(const fs::path& folder, const sfm::RegistrationInput& input,
   calib::SfmModel model = input.model;
   if (camera_id && !HasImages(model, *camera_id)) model.images.front().camera_id = *camera_id;
   for (size_t i = 0; i < model.images.size(); ++i) model.images[i].name = input.aliases[i];
-  WriteModel(folder, model, Format::kBinary);
+  colmap::WriteModel(folder, model, Format::kBinary);
 }
 
 }  // namespace
 
-void RegisterByColmap(sfm::Workspace& workspace, const sfm::RegistrationInput& input,
-                      const std::vector<sfm::CameraGroup>& groups, const sfm::ExtractionPlan& plan,
-                      const sfm::SfmOptions& options, const fs::path& registered) {
-  Program program;
+void Steps::Register(sfm::Workspace& workspace, const sfm::RegistrationInput& input,
+                     const std::vector<sfm::CameraGroup>& groups, const sfm::ExtractionPlan& plan,
+                     const sfm::SfmOptions& options, const fs::path& registered) const {
   const fs::path database = DatabaseOf(workspace), sources = input.workspace / database.filename(),
                  model = workspace.folder() / "source";
   if (!fs::exists(sources)) {
@@ -40,16 +39,16 @@ void RegisterByColmap(sfm::Workspace& workspace, const sfm::RegistrationInput& i
                 "from motion on the sources again");
   }
   CopyDatabase(sources, database);
-  ExtractFeatures(program, workspace, database, groups, plan, options.seed);
+  ExtractFeatures(workspace, database, groups, plan, options.seed);
   std::vector<std::pair<std::string, std::string>> pairs;
   for (const std::string& partner : input.partners) {
     pairs.emplace_back(workspace.AliasOf(0), partner);
   }
-  MatchPairs(program, workspace, database, pairs, 1, options.seed);
+  MatchPairs(workspace, database, pairs, 1, options.seed);
   RemoveTree(model);
   sfm::MakeFolder(registered);
   WriteAliased(model, input, groups.front().camera_id);
-  Arguments arguments(program, "image_registrator");
+  Arguments arguments("image_registrator");
   arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", options.seed))
       .AddIfKnown({"Mapper.random_seed"}, fmt::format("{}", options.seed))
       .Add({"database_path"}, database.string())

@@ -3,7 +3,8 @@
 #include <algorithm>
 
 #include "calib/colmap/database.h"
-#include "calib/colmap/placement.h"
+#include "calib/colmap/program.h"
+#include "calib/colmap/steps.h"
 #include "calib/colmap/workspace_files.h"
 #include "calib/sfm/run/known_poses.h"
 #include "dtr/base/delete.h"
@@ -62,14 +63,13 @@ calib::SfmModel NumberedAsInDatabase(const sfm::Workspace& workspace,
 
 }  // namespace
 
-calib::SfmModel TriangulateByColmap(sfm::Workspace& workspace, const calib::SfmModel& posed,
-                                    const sfm::SfmOptions& options) {
-  Program program;
+calib::SfmModel Steps::Triangulate(sfm::Workspace& workspace, const calib::SfmModel& posed,
+                                   const sfm::SfmOptions& options) const {
   const fs::path input = workspace.folder() / "posed", output = workspace.folder() / "triangulated";
   for (const fs::path& folder : {input, output}) RemoveTree(folder);
   sfm::MakeFolder(output);
   WriteModelHere(workspace, input, NumberedAsInDatabase(workspace, posed));
-  Arguments arguments(program, "point_triangulator");
+  Arguments arguments("point_triangulator");
   arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", options.seed))
       .Add({"database_path"}, DatabaseOf(workspace).string())
       .Add({"image_path"}, workspace.images_folder().string())

@@ -36,7 +36,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::SizeIs;
 
-const SfmOptions kByColmap{.colmap = &Steps(), .engine = SfmEngine::kColmap};
+const SfmOptions kByColmap{.colmap = &kSteps, .engine = SfmEngine::kColmap};
 
 // Three photos that only a fake COLMAP will open, of two cameras.
 class KnownPosesWithFake : public ::testing::Test {

@@ -78,7 +78,7 @@ void WriteQuilt(const std::array<fs::path, 4>& photos, const fs::path& file) {
 class AutoSfm : public ::testing::Test {
  protected:
   AutoSfm() : truth_(PlazaTruth()) {
-    options_.colmap = &Steps();
+    options_.colmap = &kSteps;
     options_.engine = SfmEngine::kAuto;
     options_.max_image_size_px = kSmallSidePx;
     options_.lens_model = "SIMPLE_PINHOLE";

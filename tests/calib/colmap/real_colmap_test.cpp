@@ -28,7 +28,7 @@ class RealColmap : public ::testing::Test {
   void SetUp() override {
     if (FindProgram("colmap").empty()) GTEST_SKIP() << "there is no colmap on the PATH";
     truth_ = PlazaTruth();
-    options_.colmap = &Steps();
+    options_.colmap = &kSteps;
     options_.engine = SfmEngine::kColmap;
     options_.max_image_size_px = kSidePx;
     options_.lens_model = "SIMPLE_PINHOLE";

@@ -46,7 +46,7 @@ class RunSfmWithFake : public ::testing::Test {
       WriteFileAtomically(photos_ / name, std::string("photo ") + name);
       images_.push_back({name, 640, 480, 500.0, "camera one"});
     }
-    options_.colmap = &Steps();
+    options_.colmap = &kSteps;
     options_.engine = sfm::SfmEngine::kColmap;
     options_.threads = 2;
     fake_.LeaveDatabase(Aliases());

@@ -386,8 +386,7 @@ TEST_F(RunSfmWithFake, AbsentPhotoIsNamed) {
 
 TEST(Program, LaterVersionsAreSpokenToInTheirWords) {
   const testing::FakeColmap fake(true);
-  Program program;
-  Arguments arguments(program, "feature_extractor");
+  Arguments arguments("feature_extractor");
   arguments.Add({"SiftExtraction.use_gpu", "FeatureExtraction.use_gpu"}, "0")
       .AddIfKnown({"random_seed", "default_random_seed"}, "5")
       .AddIfKnown({"no_such_option"}, "1");

@@ -26,7 +26,7 @@ using ::testing::IsEmpty;
 class OwnSfm : public ::testing::Test {
  protected:
   OwnSfm() : truth_(PlazaTruth()) {
-    options_.colmap = &colmap::Steps();
+    options_.colmap = &colmap::kSteps;
     options_.engine = SfmEngine::kGlobal;
     options_.max_image_size_px = kSidePx;
     options_.lens_model = "SIMPLE_PINHOLE";
