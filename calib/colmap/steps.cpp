@@ -10,6 +10,7 @@
 #include "calib/colmap/workspace_files.h"
 #include "calib/sfm/run/parallax.h"
 #include "dtr/base/delete.h"
+#include "dtr/base/durable.h"
 #include "dtr/base/files.h"
 
 namespace dtr::colmap {
@@ -35,6 +36,7 @@ calib::SfmModel Steps::ReadModel(const fs::path& folder) const { return colmap::
 
 void Steps::WriteModel(const fs::path& folder, const calib::SfmModel& model) const {
   colmap::WriteModel(folder, model, Format::kBinary);
+  SyncFolder(folder);
 }
 
 void Steps::Extract(sfm::Workspace& workspace, const std::vector<sfm::CameraGroup>& groups,

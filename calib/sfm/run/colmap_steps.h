@@ -38,7 +38,7 @@ class ColmapSteps {
   /// Throws where there is none that works.
   virtual std::string Version() const = 0;
 
-  /// Models in COLMAP's format, in which all are frozen.
+  /// Models in COLMAP's format, in which all are frozen; on the disk when this returns.
   virtual calib::SfmModel ReadModel(const std::filesystem::path& folder) const = 0;
   virtual void WriteModel(const std::filesystem::path& folder,
                           const calib::SfmModel& model) const = 0;

@@ -261,6 +261,7 @@ void Workspace::Step(const std::string& name, const std::string& inputs,
   RemoveTree(stamp);
   step_ = name;
   first_of_step_ = records_.size();
+  ran_program_ = false;
   try {
     body();
   } catch (const Interrupted&) {
@@ -269,7 +270,8 @@ void Workspace::Step(const std::string& name, const std::string& inputs,
     ThrowFullDisk(folder_, error.what());
     throw;
   }
-  SyncTree(folder_);  // the stamp vouches for what other programs wrote, which sync nothing
+  // The stamp vouches for what other programs wrote, which sync nothing.
+  ran_program_ ? SyncTree(folder_) : SyncFolder(folder_);
   WriteStamp(stamp, fingerprint_, std::span(records_).subspan(first_of_step_), {});
 }
 
@@ -286,6 +288,7 @@ std::optional<size_t> Workspace::Kept(const fs::path& note) {
 }
 
 void Workspace::RunProgram(const std::function<void(StepRecord&)>& run) {
+  ran_program_ = true;
   StepRecord& record = records_.emplace_back();
   record.name = step_;
   record.log_file = folder_ / "logs" / fmt::format("{:02}-{}.log", records_.size(), step_);

@@ -45,8 +45,9 @@ class Workspace {
   /// The photo's own name. Throws Error where no photo here has this alias.
   const std::string& NameOfAlias(const std::string& alias) const;
 
-  /// Runs `body` unless an earlier call finished the step `name` on the same inputs: photos (names,
-  /// sizes, contents), version, all steps before, and `inputs` (options, as text).
+  /// Runs `body`, which leaves its files on the disk, unless an earlier call finished the step
+  /// `name` on the same inputs: photos (names, sizes, contents), version, all steps before, and
+  /// `inputs` (options, as text).
   void Step(const std::string& name, const std::string& inputs, const std::function<void()>& body);
 
   /// Identity of the step running now (or last begun): hash of everything it depends on.
@@ -83,6 +84,7 @@ class Workspace {
   std::string fingerprint_;
   std::string step_;
   size_t first_of_step_ = 0;  // among records_
+  bool ran_program_ = false;  // in this step
   std::vector<StepRecord> records_;
 };
 
