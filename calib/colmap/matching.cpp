@@ -52,12 +52,7 @@ std::optional<sfm::ImagePairs> PairsToMatch(sfm::Workspace& workspace, sfm::Matc
   std::vector<std::filesystem::path> files;
   for (size_t i = 0; i < count; ++i) files.push_back(workspace.FileOf(i));
   sfm::ImagePairs pairs =
-      sfm::PreselectPairs(files, workspace.threads(), memory_gb, workspace.progress());
-  if (allowed) {
-    std::erase_if(pairs, [&](const auto& pair) {
-      return !std::binary_search(allowed->begin(), allowed->end(), pair);
-    });
-  }
+      sfm::PreselectPairs(files, allowed, workspace.threads(), memory_gb, workspace.progress());
   const size_t left_out = std::min(all, allowed ? allowed->size() : all) - pairs.size();
   if (left_out > 0) {
     workspace.progress().Note(fmt::format(

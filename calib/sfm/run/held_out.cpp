@@ -19,7 +19,6 @@
 #include "dtr/base/hash.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/base/quiet_progress.h"
-#include "dtr/io/image_io.h"
 
 namespace dtr::sfm {
 namespace fs = std::filesystem;
@@ -43,15 +42,15 @@ struct Frozen {
 class SmallSources {
  public:
   explicit SmallSources(const Frozen& frozen) : files_(frozen.files) {}
-  std::span<const SmallFeatures> Features(Progress& progress) {
-    std::call_once(once_, [&] { features_ = SmallFeaturesOfFiles(files_, 1, 0, progress); });
+  std::span<const Features> Of(Progress& progress) {
+    std::call_once(once_, [&] { features_ = SmallFeaturesOf(files_, 1, 0, progress); });
     return features_;
   }
 
  private:
   std::span<const fs::path> files_;
   std::once_flag once_;
-  std::vector<SmallFeatures> features_;
+  std::vector<Features> features_;
 };
 
 // The camera of an image, or, where a stabiliser made one lens a camera for every image, the lens
@@ -86,8 +85,9 @@ std::vector<size_t> PartnersOf(Workspace& workspace, const Frozen& frozen, Small
   std::vector<size_t> partners(frozen.sources.size());
   for (size_t i = 0; i < partners.size(); ++i) partners[i] = i;
   if (partners.size() > kExhaustiveLimit) {
-    const SmallFeatures own = SmallFeaturesOf(io::ReadImage(workspace.FileOf(0), {.memory_gb = 0}));
-    partners = MostResembling(own, small.Features(workspace.progress()));
+    const std::vector<fs::path> file{workspace.FileOf(0)};
+    const Features own = std::move(SmallFeaturesOf(file, 1, 0, workspace.progress()).front());
+    partners = MostResembling(own, small.Of(workspace.progress()));
   }
   return partners;
 }

@@ -36,7 +36,7 @@ struct SfmImageInput {
 enum class Matching {
   kAuto,         ///< exhaustive up to kExhaustiveLimit photos, preselected beyond
   kExhaustive,   ///< every pair
-  kPreselected,  ///< pairs that resemble each other in small images (calib/sfm/run/pairs.h)
+  kPreselected,  ///< pairs whose largest features match (calib/sfm/matching/pair_choice.h)
   kSequential,   ///< neighbours in the order of names: video
 };
 

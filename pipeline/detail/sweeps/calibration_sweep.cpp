@@ -7,8 +7,8 @@
 #include "calib/bundle/held_out.h"
 #include "calib/colmap/program.h"
 #include "calib/reference_tracks/score.h"
+#include "calib/sfm/matching/pair_choice.h"
 #include "calib/sfm/run/feature_plan.h"
-#include "calib/sfm/run/pairs.h"
 #include "capture/duplicates.h"
 #include "capture/ingest.h"
 #include "dtr/base/error.h"
@@ -77,7 +77,7 @@ std::vector<std::string> MatchingValues(size_t photos) {
   const sfm::Matching own = sfm::ResolveMatching(sfm::Matching::kAuto, photos);
   std::vector<std::string> values{sfm::NameOf(own)};
   for (const auto matching : {sfm::Matching::kExhaustive, sfm::Matching::kPreselected}) {
-    if (matching != own && photos > sfm::kNeighbours + 1) {
+    if (matching != own && photos > sfm::matching::kPartners + 1) {
       values.emplace_back(sfm::NameOf(matching));
     }
   }
