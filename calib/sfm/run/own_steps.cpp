@@ -176,14 +176,15 @@ size_t KeptOrNew(Workspace& workspace, const fs::path& file) {
 
 // What versions that had features and matches in databases left.
 void RemoveDatabases(Workspace& workspace) {
-  bool any = false;
+  std::vector<fs::path> found;
   for (const auto& entry : fs::directory_iterator(workspace.folder())) {
     const std::string name = entry.path().filename().string();
-    if (!name.starts_with("features.db") && !name.starts_with("database.db")) continue;
-    any = true;
-    RemoveTree(entry.path());
+    if (name.starts_with("features.db") || name.starts_with("database.db")) {
+      found.push_back(entry.path());
+    }
   }
-  if (!any) return;
+  if (found.empty()) return;
+  for (const fs::path& file : found) RemoveTree(file);
   workspace.progress().Note(
       "features and matches of another version or of COLMAP are removed: structure from motion "
       "begins again");

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "calib/colmap/database.h"
 #include "dtr/base/error.h"
 #include "tests/calib/sfm/run/some_graph.h"
