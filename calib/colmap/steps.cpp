@@ -69,7 +69,7 @@ sfm::MatchSummary Steps::Matched(const sfm::Workspace& workspace) const {
   }
   sfm::MatchSummary summary;
   summary.features.resize(workspace.images().size());
-  for (const auto& [id, features] : ReadDatabaseMatches(database).features) {
+  for (const auto& [id, features] : ReadFeatureCounts(database)) {
     const auto photo = photo_of.find(id);
     if (photo != photo_of.end()) summary.features[photo->second] = features;
   }

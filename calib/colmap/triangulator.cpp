@@ -94,8 +94,7 @@ calib::SfmModel Steps::Triangulate(sfm::Workspace& workspace, const calib::SfmMo
     throw;
   } catch (const Error&) {
     // It fails, too, where there is nothing to triangulate.
-    sfm::RequireMatches(ReadDatabaseMatches(DatabaseOf(workspace)).pairs.size(),
-                        posed.images.size());
+    sfm::RequireMatches(Matched(workspace).pairs.size(), posed.images.size());
     throw;
   }
   calib::SfmModel found = ReadModelHere(workspace, output);
