@@ -6,7 +6,6 @@
 #include "calib/colmap/graph_database.h"
 #include "calib/colmap/program.h"
 #include "calib/colmap/steps.h"
-#include "calib/colmap/workspace_files.h"
 #include "calib/sfm/run/own_steps.h"
 #include "calib/sfm/run/sfm_steps.h"
 #include "calib/sfm/run/store.h"

@@ -5,6 +5,7 @@
 
 #include <sstream>
 
+#include "calib/colmap/model_io.h"
 #include "calib/sfm/run/sfm_steps.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/error.h"
@@ -178,6 +179,13 @@ void RunStep(sfm::Workspace& workspace, const Arguments& arguments,
   workspace.RunProgram([&](sfm::StepRecord& record) {
     RunColmap(arguments.argv(), record, on_line, workspace.progress());
   });
+}
+
+calib::SfmModel ReadModelHere(const sfm::Workspace& workspace,
+                              const std::filesystem::path& folder) {
+  calib::SfmModel model = ReadModel(folder);
+  for (calib::SfmImage& image : model.images) image.name = workspace.NameOfAlias(image.name);
+  return model;  // aliases sort as the names do
 }
 
 }  // namespace dtr::colmap

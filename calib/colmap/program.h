@@ -1,5 +1,6 @@
 // calib/colmap/program.h -- COLMAP as a program: its version, its options, one run of it.
 #pragma once
+#include <filesystem>
 #include <functional>
 #include <initializer_list>
 #include <map>
@@ -69,8 +70,14 @@ void AllowForwardMotion(Arguments& arguments);
 void RunColmap(const std::vector<std::string>& argv, sfm::StepRecord& record,
                const std::function<void(const std::string&)>& on_line, Progress& progress);
 
-/// The same inside a step of a workspace.
+/// The same inside a step of a workspace, whose database that is.
 void RunStep(sfm::Workspace& workspace, const Arguments& arguments,
              const std::function<void(const std::string&)>& on_line);
+inline std::filesystem::path DatabaseOf(const sfm::Workspace& workspace) {
+  return workspace.folder() / "database.db";
+}
+
+/// Reads a model COLMAP made in a workspace and gives the images their own names back.
+calib::SfmModel ReadModelHere(const sfm::Workspace& workspace, const std::filesystem::path& folder);
 
 }  // namespace dtr::colmap

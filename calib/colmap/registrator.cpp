@@ -6,7 +6,6 @@
 #include "calib/colmap/model_io.h"
 #include "calib/colmap/program.h"
 #include "calib/colmap/steps.h"
-#include "calib/colmap/workspace_files.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 

@@ -7,7 +7,6 @@
 #include "calib/colmap/matching.h"
 #include "calib/colmap/model_io.h"
 #include "calib/colmap/program.h"
-#include "calib/colmap/workspace_files.h"
 #include "calib/sfm/run/parallax.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/durable.h"

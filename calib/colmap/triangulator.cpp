@@ -3,9 +3,9 @@
 #include <algorithm>
 
 #include "calib/colmap/database.h"
+#include "calib/colmap/model_io.h"
 #include "calib/colmap/program.h"
 #include "calib/colmap/steps.h"
-#include "calib/colmap/workspace_files.h"
 #include "calib/sfm/run/known_poses.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/error.h"
@@ -40,7 +40,8 @@ void CheckKept(const std::string& where, const calib::SfmModel& posed,
   }
 }
 
-// The posed model under the numbers of the database, which extractor threads hand out as they go.
+// The posed model under the names and numbers of the database, which extractor threads hand out as
+// they go.
 calib::SfmModel NumberedAsInDatabase(const sfm::Workspace& workspace,
                                      const calib::SfmModel& posed) {
   const auto ids = ReadDatabaseIds(DatabaseOf(workspace));
@@ -55,6 +56,7 @@ calib::SfmModel NumberedAsInDatabase(const sfm::Workspace& workspace,
     }
     calib::SfmImage& image = model.images.emplace_back(posed.images[i]);
     image.id = in_database->second.image_id;
+    image.name = workspace.AliasOf(i);
     image.camera_id = in_database->second.camera_id;
     model.cameras[image.camera_id] = posed.cameras.at(posed.images[i].camera_id);
   }
@@ -68,7 +70,7 @@ calib::SfmModel Steps::Triangulate(sfm::Workspace& workspace, const calib::SfmMo
   const fs::path input = workspace.folder() / "posed", output = workspace.folder() / "triangulated";
   for (const fs::path& folder : {input, output}) RemoveTree(folder);
   sfm::MakeFolder(output);
-  WriteModelHere(workspace, input, NumberedAsInDatabase(workspace, posed));
+  colmap::WriteModel(input, NumberedAsInDatabase(workspace, posed), Format::kBinary);
   Arguments arguments("point_triangulator");
   arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", options.seed))
       .Add({"database_path"}, DatabaseOf(workspace).string())

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <functional>
+#include <initializer_list>
 #include <map>
 
 #include "calib/models/fisheye.h"
@@ -12,7 +13,6 @@
 #include "calib/sfm/mapping/global_mapper.h"
 #include "calib/sfm/matching/match_photos.h"
 #include "calib/sfm/matching/pair_journal.h"
-#include "calib/sfm/run/feature_parts.h"
 #include "calib/sfm/run/parallax.h"
 #include "calib/sfm/run/point_colours.h"
 #include "calib/sfm/run/store.h"
@@ -32,6 +32,7 @@ constexpr double kGuessedFocal = 1.2;
 constexpr double kGuessedFisheyeFocal = 0.4;  // 143 degrees on the long side
 // Of the memory, for descriptors; matches and what they are copied to take the rest.
 constexpr double kDescriptorShare = 0.5;
+constexpr char kPart[] = ".part_";  // of features that one of several processes found
 
 // Brightness of a photo by the weights of ITU-R BT.709.
 Grid<std::uint8_t> GreyOf(const ImageRgb8& image) {
@@ -136,6 +137,23 @@ Features FeaturesOf(const fs::path& photo, const fs::path& mask_file, int max_im
 
 namespace {
 
+// Beside a file of features: how much of it is whole (Workspace::Keep).
+fs::path NoteOf(const fs::path& file) { return file.string() + ".begun"; }
+
+// Files in the workspace whose names begin so.
+std::vector<fs::path> FilesCalled(const Workspace& workspace,
+                                  std::initializer_list<std::string> beginnings) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(workspace.folder())) {
+    const std::string name = entry.path().filename().string();
+    for (const std::string& beginning : beginnings) {
+      if (name.starts_with(beginning)) files.push_back(entry.path());
+    }
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
 // Features of photos, from wherever.
 using FindFeatures = std::function<Features(size_t image)>;
 
@@ -176,18 +194,22 @@ size_t KeptOrNew(Workspace& workspace, const fs::path& file) {
 
 // What versions that had features and matches in databases left.
 void RemoveDatabases(Workspace& workspace) {
-  std::vector<fs::path> found;
-  for (const auto& entry : fs::directory_iterator(workspace.folder())) {
-    const std::string name = entry.path().filename().string();
-    if (name.starts_with("features.db") || name.starts_with("database.db")) {
-      found.push_back(entry.path());
-    }
-  }
+  const auto found = FilesCalled(workspace, {"features.db", "database.db"});
   if (found.empty()) return;
   for (const fs::path& file : found) RemoveTree(file);
   workspace.progress().Note(
       "features and matches of another version or of COLMAP are removed: structure from motion "
       "begins again");
+}
+
+// What of `files`, of parts, has a note of the step that runs; what they cost is taken over, too.
+std::vector<FeatureFile> WholeOf(Workspace& workspace, const std::vector<fs::path>& files) {
+  std::vector<FeatureFile> whole;
+  for (const fs::path& file : files) {
+    if (!fs::exists(NoteOf(file))) continue;
+    if (const auto kept = workspace.Kept(NoteOf(file))) whole.emplace_back(file, *kept);
+  }
+  return whole;
 }
 
 }  // namespace
@@ -204,7 +226,8 @@ void OwnFeatures(Workspace& workspace, const std::vector<CameraGroup>& groups,
     const std::vector<size_t> own(
         images.begin() + static_cast<std::ptrdiff_t>(part->part.Begin(images.size())),
         images.begin() + static_cast<std::ptrdiff_t>(part->part.End(images.size())));
-    const fs::path file = PartOf(all, part->part);
+    const fs::path file =
+        fmt::format("{}{}_of_{}", all.string() + kPart, part->part.index, part->part.count);
     AddInBatches(workspace, file, own, KeptOrNew(workspace, file), plan, detect);
     throw PartDone();
   }
@@ -212,12 +235,15 @@ void OwnFeatures(Workspace& workspace, const std::vector<CameraGroup>& groups,
     throw Error("features: expected those of all photos, found none; run the stage pairs first");
   }
   RemoveDatabases(workspace);
-  const FeatureParts parts(workspace, all);
+  const auto files = FilesCalled(workspace, {kFeatureFile + std::string(kPart)});
+  const std::vector<FeatureFile> parts = WholeOf(workspace, files);
   AddInBatches(workspace, all, images, KeptOrNew(workspace, all), plan, [&](size_t image) {
-    const auto found = parts.Of(image);
-    return found ? *found : detect(image);
+    for (const FeatureFile& file : parts) {
+      if (file.Has(image)) return file.Of(image);
+    }
+    return detect(image);
   });
-  parts.Remove();
+  for (const fs::path& file : files) RemoveTree(file);
 }
 
 void OwnMatches(Workspace& workspace, const std::vector<CameraGroup>& groups, Matching matching,
