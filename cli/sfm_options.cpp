@@ -13,10 +13,10 @@ constexpr int kMinFeatures = 128, kSmallestPx = 64;  // with less no photos come
 }  // namespace
 
 CLI::Option* AddSfmOptions(CLI::App& command, pipeline::SfmChoice& choice) {
-  std::map<std::string, colmap::SfmEngine> engines;
+  std::map<std::string, sfm::SfmEngine> engines;
   for (const auto engine :
-       {colmap::SfmEngine::kColmap, colmap::SfmEngine::kGlobal, colmap::SfmEngine::kAuto}) {
-    engines[colmap::NameOf(engine)] = engine;
+       {sfm::SfmEngine::kColmap, sfm::SfmEngine::kGlobal, sfm::SfmEngine::kAuto}) {
+    engines[sfm::NameOf(engine)] = engine;
   }
   command
       .add_option_function<std::string>(
@@ -35,13 +35,13 @@ CLI::Option* AddSfmOptions(CLI::App& command, pipeline::SfmChoice& choice) {
   command
       .add_option("--features", choice.features,
                   fmt::format("Max features per photo [{}; of COLMAP {}, its limit]",
-                              colmap::kMaxOwnFeatures, colmap::kMaxFeatures))
-      ->check(CLI::Range(kMinFeatures, colmap::kMaxOwnFeatures))
+                              sfm::kMaxOwnFeatures, sfm::kMaxFeatures))
+      ->check(CLI::Range(kMinFeatures, sfm::kMaxOwnFeatures))
       ->type_name("N");
-  std::map<std::string, colmap::Matching> names;
-  for (const auto matching : {colmap::Matching::kAuto, colmap::Matching::kExhaustive,
-                              colmap::Matching::kPreselected, colmap::Matching::kSequential}) {
-    names[colmap::NameOf(matching)] = matching;
+  std::map<std::string, sfm::Matching> names;
+  for (const auto matching : {sfm::Matching::kAuto, sfm::Matching::kExhaustive,
+                              sfm::Matching::kPreselected, sfm::Matching::kSequential}) {
+    names[sfm::NameOf(matching)] = matching;
   }
   command
       .add_option_function<std::string>(

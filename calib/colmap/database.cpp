@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "calib/colmap/sqlite_file.h"
-#include "calib/colmap/workspace.h"
+#include "calib/sfm/run/workspace.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
@@ -42,19 +42,13 @@ std::map<std::string, DatabaseIds> ReadDatabaseIds(const std::filesystem::path& 
   return images;
 }
 
-DatabaseMatches ReadDatabaseMatches(const std::filesystem::path& database) {
+std::map<std::uint32_t, std::int64_t> ReadFeatureCounts(const std::filesystem::path& database) {
   const ReadOnlyDatabase opened(database);
-  DatabaseMatches found;
+  std::map<std::uint32_t, std::int64_t> counts;
   opened.ForEachRow("SELECT image_id, rows FROM keypoints", [&](sqlite3_stmt* row) {
-    found.features[opened.Id(sqlite3_column_int64(row, 0))] = sqlite3_column_int64(row, 1);
+    counts[opened.Id(sqlite3_column_int64(row, 0))] = sqlite3_column_int64(row, 1);
   });
-  opened.ForEachRow(
-      "SELECT pair_id, rows FROM two_view_geometries WHERE rows > 0", [&](sqlite3_stmt* row) {
-        const sqlite3_int64 pair = sqlite3_column_int64(row, 0);
-        found.pairs.push_back({{opened.Id(pair / kPairBase), opened.Id(pair % kPairBase)},
-                               sqlite3_column_int64(row, 1)});
-      });
-  return found;
+  return counts;
 }
 
 void ForEachMatchedPair(const std::filesystem::path& database,

@@ -20,20 +20,8 @@ struct DatabaseIds {
 /// Throws Error when the file is no COLMAP database.
 std::map<std::string, DatabaseIds> ReadDatabaseIds(const std::filesystem::path& database);
 
-/// Features that two images have in common: matches that agree with one geometry of the pair.
-struct DatabasePair {
-  std::uint32_t image_ids[2];
-  std::int64_t common;
-};
-
-/// What a database says of images by their ids.
-struct DatabaseMatches {
-  std::map<std::uint32_t, std::int64_t> features;  ///< number found in each image
-  std::vector<DatabasePair> pairs;                 ///< that have anything in common
-};
-
-/// Throws Error when the file is no COLMAP database.
-DatabaseMatches ReadDatabaseMatches(const std::filesystem::path& database);
+/// The number of features found in each image, by its id. Throws as ReadDatabaseIds.
+std::map<std::uint32_t, std::int64_t> ReadFeatureCounts(const std::filesystem::path& database);
 
 /// A pair of images that COLMAP verified.
 struct MatchedPair {

@@ -123,13 +123,12 @@ void RequireCuda() {
       program.version()));
 }
 
-StepRecord RunPatchMatchStereo(const fs::path& workspace, Progress& progress) {
+sfm::StepRecord RunPatchMatchStereo(const fs::path& workspace, Progress& progress) {
   RequireCuda();
-  Program program;
-  Arguments arguments(program, "patch_match_stereo");
+  Arguments arguments("patch_match_stereo");
   arguments.Add({"workspace_path"}, workspace.string());
   arguments.Add({"PatchMatchStereo.geom_consistency"}, "1");
-  StepRecord record;
+  sfm::StepRecord record;
   record.name = "dense depth";
   record.log_file = workspace / "patch_match_stereo.log";
   progress.Stage("colmap patch_match_stereo", 0);

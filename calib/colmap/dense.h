@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 #include "calib/sfm_model.h"
 #include "dtr/base/progress.h"
 #include "dtr/types/camera.h"
@@ -47,6 +47,6 @@ void RequireCuda();
 
 /// Runs `colmap patch_match_stereo` with geometric consistency on the workspace; its log goes to
 /// `workspace`/patch_match_stereo.log. Throws as RequireCuda and RunColmap do.
-StepRecord RunPatchMatchStereo(const std::filesystem::path& workspace, Progress& progress);
+sfm::StepRecord RunPatchMatchStereo(const std::filesystem::path& workspace, Progress& progress);
 
 }  // namespace dtr::colmap

@@ -3,59 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <map>
-#include <tuple>
 
 #include "calib/colmap/database.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
-#include "dtr/base/memory_budget.h"
-#include "dtr/base/order_statistics.h"
-#include "dtr/base/parallel_for.h"
 
 namespace dtr::colmap {
 namespace {
 
-constexpr double kMib = 1024.0 * 1024.0;
-// COLMAP's own start for the FOV model, which is singular at 0.
-constexpr double kFovStart = 0.01;
-
-struct LargestImage {
-  double pixels = 0;  // of the largest photo
-  double side_px = 0;
-};
-
-LargestImage LargestOf(const std::vector<SfmImageInput>& images) {
-  LargestImage largest;
-  for (const SfmImageInput& image : images) {
-    const double pixels = static_cast<double>(image.width_px) * image.height_px;
-    largest.pixels = std::max(largest.pixels, pixels);
-    largest.side_px =
-        std::max(largest.side_px, static_cast<double>(std::max(image.width_px, image.height_px)));
-  }
-  return largest;
-}
-
-// Pixels COLMAP works on when the long side is bounded.
-double WorkingPixels(const std::vector<SfmImageInput>& images, double side_px) {
-  double most = 0;
-  for (const SfmImageInput& image : images) {
-    const double scale = std::min(1.0, side_px / std::max(image.width_px, image.height_px));
-    most = std::max(most, scale * scale * image.width_px * image.height_px);
-  }
-  return most;
-}
-
-double PeakMib(double working_pixels, double full_pixels, int threads) {
-  return kBaseMib + (threads * kBytesPerPixelAndThread * working_pixels +
-                     (threads + 1) * kQueueBytesPerPixel * full_pixels) /
-                        kMib;
-}
-
 // COLMAP skips what it cannot read and ends with 0.
-void ExpectInDatabase(const Workspace& workspace, const std::filesystem::path& database,
+void ExpectInDatabase(const sfm::Workspace& workspace, const std::filesystem::path& database,
                       const std::vector<size_t>& images) {
   const auto ids = ReadDatabaseIds(database);
   for (const size_t i : images) {
@@ -68,24 +26,24 @@ void ExpectInDatabase(const Workspace& workspace, const std::filesystem::path& d
 }
 
 // The camera that the database has of photos of a group already.
-std::optional<std::uint32_t> CameraOf(const Workspace& workspace,
+std::optional<std::uint32_t> CameraOf(const sfm::Workspace& workspace,
                                       const std::filesystem::path& database,
-                                      const CameraGroup& group) {
+                                      const sfm::CameraGroup& group) {
   const auto ids = ReadDatabaseIds(database);
   const auto known = ids.find(workspace.AliasOf(group.images.front()));
   return known == ids.end() ? std::nullopt : std::optional(known->second.camera_id);
 }
 
 // `camera_id`: the group's in the database, where it has one.
-Arguments ExtractorArguments(Workspace& workspace, const std::filesystem::path& database,
-                             const CameraGroup& group, const ExtractionRun& run,
-                             std::optional<std::uint32_t> camera_id, const ExtractionPlan& plan,
-                             std::uint64_t seed) {
+Arguments ExtractorArguments(sfm::Workspace& workspace, const std::filesystem::path& database,
+                             const sfm::CameraGroup& group, const ExtractionRun& run,
+                             std::optional<std::uint32_t> camera_id,
+                             const sfm::ExtractionPlan& plan, std::uint64_t seed) {
   std::vector<std::string> names;
   for (const size_t i : run.images) names.push_back(workspace.AliasOf(i));
   const auto list =
       workspace.WriteList(fmt::format("camera_{:04}_{:06}.txt", run.group, run.images[0]), names);
-  Arguments arguments(workspace.program(), "feature_extractor");
+  Arguments arguments("feature_extractor");
   arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", seed))
       .Add({"database_path"}, database.string())
       .Add({"image_path"}, workspace.images_folder().string())
@@ -109,7 +67,7 @@ Arguments ExtractorArguments(Workspace& workspace, const std::filesystem::path& 
   }
   arguments.Add({"ImageReader.single_camera"}, "1");
   if (!group.params.empty()) {
-    arguments.Add({"ImageReader.camera_params"}, ParamsText(group.params));
+    arguments.Add({"ImageReader.camera_params"}, sfm::ParamsText(group.params));
   }
   return arguments;
 }
@@ -121,102 +79,28 @@ size_t PhotosIn(const std::vector<ExtractionRun>& batch) {
 }
 
 // `before`: photos of the groups whose features the database holds already.
-void ExtractBatch(Workspace& workspace, const std::filesystem::path& database,
-                  const std::vector<CameraGroup>& groups, const std::vector<ExtractionRun>& batch,
-                  const ExtractionPlan& plan, std::uint64_t seed, size_t before) {
+void ExtractBatch(sfm::Workspace& workspace, const std::filesystem::path& database,
+                  const std::vector<sfm::CameraGroup>& groups,
+                  const std::vector<ExtractionRun>& batch, const sfm::ExtractionPlan& plan,
+                  std::uint64_t seed, size_t before) {
   int done = static_cast<int>(before);
   for (const ExtractionRun& run : batch) {
-    const CameraGroup& group = groups[run.group];
+    const sfm::CameraGroup& group = groups[run.group];
     auto camera_id = group.camera_id;
     if (!camera_id && before > 0) camera_id = CameraOf(workspace, database, group);
-    workspace.Run(ExtractorArguments(workspace, database, group, run, camera_id, plan, seed),
-                  [&](const std::string& line) {
-                    if (line.find("Processed file [") != std::string::npos) {
-                      workspace.progress().Update(++done);
-                    }
-                  });
+    RunStep(workspace, ExtractorArguments(workspace, database, group, run, camera_id, plan, seed),
+            [&](const std::string& line) {
+              if (line.find("Processed file [") != std::string::npos) {
+                workspace.progress().Update(++done);
+              }
+            });
     ExpectInDatabase(workspace, database, run.images);
   }
 }
 
 }  // namespace
 
-std::vector<double> FirstGuess(calib::CameraModel model, const SfmImageInput& image,
-                               double focal_px) {
-  std::vector<double> params(static_cast<size_t>(calib::ParameterCount(model)), 0.0);
-  const bool one_focal =
-      model == calib::CameraModel::kSimplePinhole || model == calib::CameraModel::kSimpleRadial ||
-      model == calib::CameraModel::kRadial || model == calib::CameraModel::kSimpleRadialFisheye ||
-      model == calib::CameraModel::kRadialFisheye;
-  size_t next = 0;
-  params[next++] = focal_px;
-  if (!one_focal) params[next++] = focal_px;
-  params[next++] = 0.5 * image.width_px;
-  params[next++] = 0.5 * image.height_px;
-  if (model == calib::CameraModel::kFov) params[next] = kFovStart;
-  return params;
-}
-
-ExtractionPlan PlanExtraction(const std::vector<SfmImageInput>& images, double memory_gb,
-                              int requested_side_px) {
-  const double limit_mib = kFill * memory_gb * kBytesPerGigabyte / kMib;
-  const LargestImage largest = LargestOf(images);
-  ExtractionPlan plan;
-  double side_px = requested_side_px > 0 ? requested_side_px : kPreferredSidePx;
-  side_px = std::min(side_px, largest.side_px);
-  const auto peak = [&](double side, int count) {
-    return PeakMib(WorkingPixels(images, side), largest.pixels, count);
-  };
-  while (side_px > kSmallestSidePx && peak(side_px, 1) > limit_mib) --side_px;
-  if (peak(side_px, 1) > limit_mib) {
-    constexpr double kShown = 100;  // of a gigabyte, rounded up: what is asked for must do
-    throw UsageError(fmt::format(
-        "`memory` {:g}: expected at least {:.2f} (GB) for features of photos of this size; give as "
-        "much, or smaller photos",
-        memory_gb,
-        std::ceil(kShown * peak(side_px, 1) * kMib / kFill / kBytesPerGigabyte) / kShown));
-  }
-  plan.max_image_size_px = static_cast<int>(side_px);
-  plan.threads = std::clamp(ThreadLimit::Current(), 1, static_cast<int>(images.size()));
-  while (plan.threads > 1 && peak(side_px, plan.threads) > limit_mib) --plan.threads;
-  plan.expected_peak_gib = peak(side_px, plan.threads) / 1024;
-  return plan;
-}
-
-std::vector<CameraGroup> GroupCameras(const std::vector<SfmImageInput>& images,
-                                      calib::CameraModel model, bool share) {
-  using Key = std::tuple<std::string, int, int, size_t>;
-  std::map<Key, size_t> index;
-  std::vector<CameraGroup> groups;
-  for (size_t i = 0; i < images.size(); ++i) {
-    const SfmImageInput& image = images[i];
-    const Key key{image.camera_group, image.width_px, image.height_px, share ? 0 : i};
-    const auto [known, is_new] = index.emplace(key, groups.size());
-    if (is_new) groups.emplace_back().model = model;
-    groups[known->second].images.push_back(i);
-  }
-  for (CameraGroup& group : groups) {
-    if (const auto& known = images[group.images.front()].known_lens) {
-      group.model = known->model;
-      group.params = known->params;
-      continue;
-    }
-    std::vector<double> priors;
-    for (const size_t i : group.images) {
-      if (images[i].focal_prior_px) priors.push_back(*images[i].focal_prior_px);
-    }
-    if (!priors.empty()) {
-      group.params = FirstGuess(model, images[group.images.front()], UpperMedian(priors));
-    }
-  }
-  return groups;
-}
-
-std::string ParamsText(const std::vector<double>& params) {
-  return fmt::format("{}", fmt::join(params, ","));
-}
-
-std::vector<std::vector<ExtractionRun>> InBatches(const std::vector<CameraGroup>& groups) {
+std::vector<std::vector<ExtractionRun>> InBatches(const std::vector<sfm::CameraGroup>& groups) {
   std::vector<std::vector<ExtractionRun>> batches;
   size_t before = 0, in_batch = 0, limit = 0;
   for (size_t g = 0; g < groups.size(); ++g) {
@@ -224,7 +108,7 @@ std::vector<std::vector<ExtractionRun>> InBatches(const std::vector<CameraGroup>
       if (in_batch == limit) {
         before += in_batch;
         in_batch = 0;
-        limit = std::max(kPhotosPerBatch, before / 4);
+        limit = std::max(sfm::kPhotosPerBatch, before / 4);
         batches.emplace_back();
       }
       auto& batch = batches.back();
@@ -236,8 +120,8 @@ std::vector<std::vector<ExtractionRun>> InBatches(const std::vector<CameraGroup>
   return batches;
 }
 
-void ExtractFeatures(Workspace& workspace, const std::filesystem::path& database,
-                     const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
+void ExtractFeatures(sfm::Workspace& workspace, const std::filesystem::path& database,
+                     const std::vector<sfm::CameraGroup>& groups, const sfm::ExtractionPlan& plan,
                      std::uint64_t seed) {
   workspace.progress().Stage("features", static_cast<int>(workspace.images().size()));
   size_t before = 0;
@@ -247,9 +131,9 @@ void ExtractFeatures(Workspace& workspace, const std::filesystem::path& database
   }
 }
 
-void ExtractFeaturesResumably(Workspace& workspace, const std::filesystem::path& database,
-                              const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
-                              std::uint64_t seed) {
+void ExtractFeaturesResumably(sfm::Workspace& workspace, const std::filesystem::path& database,
+                              const std::vector<sfm::CameraGroup>& groups,
+                              const sfm::ExtractionPlan& plan, std::uint64_t seed) {
   const std::filesystem::path working = database.string() + ".working",
                               note = database.string() + ".begun";
   const size_t kept = std::filesystem::exists(database) ? workspace.Kept(note).value_or(0) : 0;
@@ -275,7 +159,7 @@ void ExtractFeaturesResumably(Workspace& workspace, const std::filesystem::path&
     }
     before = after;
   }
-  for (const CameraGroup& group : groups) ExpectInDatabase(workspace, database, group.images);
+  for (const sfm::CameraGroup& group : groups) ExpectInDatabase(workspace, database, group.images);
 }
 
 }  // namespace dtr::colmap

@@ -1,64 +1,13 @@
-// calib/colmap/features.h -- feature extraction within a memory limit, camera by camera.
+// calib/colmap/features.h -- feature extraction by COLMAP.
 #pragma once
-#include <functional>
-#include <optional>
-#include <string>
+#include <filesystem>
 #include <vector>
 
-#include "calib/colmap/workspace.h"
-#include "calib/lens_camera.h"
+#include "calib/colmap/program.h"
+#include "calib/sfm/run/feature_plan.h"
+#include "calib/sfm/run/workspace.h"
 
 namespace dtr::colmap {
-
-/// How features are extracted so that memory suffices.
-struct ExtractionPlan {
-  int threads = 1;
-  int max_image_size_px = 0;  ///< long side; larger photos are scaled down for features only
-  double expected_peak_gib = 0;
-  int max_features = 0;  ///< per photo; 0: COLMAP's own limit
-};
-
-/// Model of COLMAP's CPU extraction (VLFeat SIFT from octave -1, that is, on the doubled image):
-/// 290 bytes per pixel and thread for the scale space, that is 18 float planes of 4 pixels per
-/// pixel, and a part that does not scale. Measured on 6 Mpx photos with COLMAP 3.8, one thread:
-/// 623 MiB at 1600 px, 1315 MiB at 2400 px, which is 302 bytes per pixel and 69 MiB.
-inline constexpr double kBytesPerPixelAndThread = 310;
-inline constexpr double kBaseMib = 100;
-/// Decoded photos wait in COLMAP's queues, about one per thread and one more; RGB.
-inline constexpr double kQueueBytesPerPixel = 3;
-/// Share of the limit the plan fills; the rest is for what the model does not know.
-inline constexpr double kFill = 0.9;
-/// Long side used when the memory allows and nothing else is asked.
-inline constexpr int kPreferredSidePx = 2400;
-/// Below this long side features no longer tell photos apart; less memory is rejected.
-inline constexpr int kSmallestSidePx = 640;
-
-/// Chooses threads and size: the size first (`requested_side_px`, or kPreferredSidePx when 0), then
-/// as many threads as fit; when not even one fits, the largest size at which one does.
-/// Throws UsageError when memory_gb does not suffice for kSmallestSidePx.
-ExtractionPlan PlanExtraction(const std::vector<SfmImageInput>& images, double memory_gb,
-                              int requested_side_px);
-
-/// Photos that share one camera of the database.
-struct CameraGroup {
-  std::vector<size_t> images;  ///< indices into Workspace::images(), rising
-  calib::CameraModel model = calib::CameraModel::kSimpleRadial;
-  std::vector<double> params;              ///< a good first guess, or empty: COLMAP guesses
-  std::optional<std::uint32_t> camera_id;  ///< of the database, when it holds the camera already
-};
-
-/// Groups by camera_group and size (every photo alone when not `share`), in the order of the first
-/// photo's name. The guess is the median focal prior of the group, no distortion; a known lens is
-/// taken as it is.
-std::vector<CameraGroup> GroupCameras(const std::vector<SfmImageInput>& images,
-                                      calib::CameraModel model, bool share);
-
-/// Parameters of a lens with this focal length, its principal point in the middle, no distortion.
-std::vector<double> FirstGuess(calib::CameraModel model, const SfmImageInput& image,
-                               double focal_px);
-
-/// COLMAP's text of camera parameters: exact decimals separated by commas.
-std::string ParamsText(const std::vector<double>& params);
 
 /// What one run of the extractor is given: photos of one group.
 struct ExtractionRun {
@@ -66,24 +15,21 @@ struct ExtractionRun {
   std::vector<size_t> images;  ///< indices into Workspace::images()
 };
 
-/// Photos after which features are safe from an interruption, at first: a minute or two of work.
-inline constexpr size_t kPhotosPerBatch = 48;
-
 /// All photos of the groups, in their order, in batches of kPhotosPerBatch or a quarter of those
 /// before, whichever is more: what is copied to keep them is then a few times the whole at most.
-std::vector<std::vector<ExtractionRun>> InBatches(const std::vector<CameraGroup>& groups);
+std::vector<std::vector<ExtractionRun>> InBatches(const std::vector<sfm::CameraGroup>& groups);
 
 /// Extracts into `database`, one extractor run per group or part of one; parts of a group share the
-/// camera that its first made. Throws as Workspace::Run, and Error when a photo could not be read
+/// camera that its first made. Throws as RunStep, and Error when a photo could not be read
 /// by COLMAP.
-void ExtractFeatures(Workspace& workspace, const std::filesystem::path& database,
-                     const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
+void ExtractFeatures(sfm::Workspace& workspace, const std::filesystem::path& database,
+                     const std::vector<sfm::CameraGroup>& groups, const sfm::ExtractionPlan& plan,
                      std::uint64_t seed);
 
 /// The same, batch by batch: after each, `database` holds it whole, and an interrupted extraction
 /// of a workspace with the same fingerprint goes on after the last of them.
-void ExtractFeaturesResumably(Workspace& workspace, const std::filesystem::path& database,
-                              const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
-                              std::uint64_t seed);
+void ExtractFeaturesResumably(sfm::Workspace& workspace, const std::filesystem::path& database,
+                              const std::vector<sfm::CameraGroup>& groups,
+                              const sfm::ExtractionPlan& plan, std::uint64_t seed);
 
 }  // namespace dtr::colmap

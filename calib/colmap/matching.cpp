@@ -5,8 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "calib/colmap/features.h"
-#include "calib/colmap/pairs.h"
+#include "calib/sfm/run/pairs.h"
 #include "dtr/base/parallel_for.h"
 
 namespace dtr::colmap {
@@ -19,9 +18,9 @@ constexpr int kBlockPhotos = 10;
 constexpr int kSequentialOverlap = 10;
 constexpr double kMatcherGib = 0.5;
 
-Arguments MatcherArguments(Workspace& workspace, const char* command,
-                           const std::filesystem::path& database, int threads, std::uint64_t seed) {
-  Arguments arguments(workspace.program(), command);
+Arguments MatcherArguments(const char* command, const std::filesystem::path& database, int threads,
+                           std::uint64_t seed) {
+  Arguments arguments(command);
   arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", seed))
       .Add({"database_path"}, database.string())
       .Add({"SiftMatching.use_gpu", "FeatureMatching.use_gpu"}, "0")
@@ -29,10 +28,10 @@ Arguments MatcherArguments(Workspace& workspace, const char* command,
   return arguments;
 }
 
-void RunMatcher(Workspace& workspace, const Arguments& arguments) {
+void RunMatcher(sfm::Workspace& workspace, const Arguments& arguments) {
   constexpr int kPercent = 100;
   workspace.progress().Stage("matching", kPercent);
-  workspace.Run(arguments, [&](const std::string& line) {
+  RunStep(workspace, arguments, [&](const std::string& line) {
     if (const int percent = MatchingPercent(line); percent >= 0) {
       workspace.progress().Update(percent);
     }
@@ -40,24 +39,20 @@ void RunMatcher(Workspace& workspace, const Arguments& arguments) {
 }
 
 // The pairs to name to COLMAP; empty where it takes all that its matcher finds by itself.
-std::optional<ImagePairs> PairsToMatch(Workspace& workspace, Matching matching, double memory_gb,
-                                       const std::optional<ImagePairs>& allowed) {
+std::optional<sfm::ImagePairs> PairsToMatch(sfm::Workspace& workspace, sfm::Matching matching,
+                                            double memory_gb,
+                                            const std::optional<sfm::ImagePairs>& allowed) {
   const size_t count = workspace.images().size(), all = count * (count - 1) / 2;
   if (allowed && allowed->size() < all) {
     workspace.progress().Note(fmt::format(
         "{} of {} pairs of photos left out of matching: their cameras cannot see the same thing",
         all - allowed->size(), all));
   }
-  if (matching == Matching::kExhaustive && allowed && allowed->size() < all) return allowed;
-  if (matching != Matching::kPreselected) return {};
+  if (matching == sfm::Matching::kExhaustive && allowed && allowed->size() < all) return allowed;
+  if (matching != sfm::Matching::kPreselected) return {};
   std::vector<std::filesystem::path> files;
   for (size_t i = 0; i < count; ++i) files.push_back(workspace.FileOf(i));
-  ImagePairs pairs = PreselectPairs(files, memory_gb, workspace.progress());
-  if (allowed) {
-    std::erase_if(pairs, [&](const auto& pair) {
-      return !std::binary_search(allowed->begin(), allowed->end(), pair);
-    });
-  }
+  sfm::ImagePairs pairs = sfm::PreselectPairs(files, allowed, memory_gb, workspace.progress());
   const size_t left_out = std::min(all, allowed ? allowed->size() : all) - pairs.size();
   if (left_out > 0) {
     workspace.progress().Note(fmt::format(
@@ -69,13 +64,9 @@ std::optional<ImagePairs> PairsToMatch(Workspace& workspace, Matching matching, 
 
 }  // namespace
 
-Matching ResolveMatching(Matching matching, size_t images) {
-  if (matching != Matching::kAuto) return matching;
-  return images <= kExhaustiveLimit ? Matching::kExhaustive : Matching::kPreselected;
-}
-
 int MatchingThreads(double memory_gb) {
-  return std::clamp(static_cast<int>(kFill * memory_gb / kMatcherGib), 1, ThreadLimit::Current());
+  return std::clamp(static_cast<int>(sfm::kFill * memory_gb / kMatcherGib), 1,
+                    ThreadLimit::Current());
 }
 
 int MatchingPercent(const std::string& line) {
@@ -94,19 +85,20 @@ int MatchingPercent(const std::string& line) {
                           (static_cast<double>(rows) * columns));
 }
 
-void MatchPairs(Workspace& workspace, const std::filesystem::path& database,
+void MatchPairs(sfm::Workspace& workspace, const std::filesystem::path& database,
                 const std::vector<std::pair<std::string, std::string>>& pairs, int threads,
                 std::uint64_t seed) {
   std::vector<std::string> lines;
   for (const auto& [a, b] : pairs) lines.push_back(a + " " + b);
-  Arguments arguments = MatcherArguments(workspace, "matches_importer", database, threads, seed);
+  Arguments arguments = MatcherArguments("matches_importer", database, threads, seed);
   arguments.Add({"match_list_path"}, workspace.WriteList("pairs.txt", lines).string())
       .Add({"match_type"}, "pairs");
   RunMatcher(workspace, arguments);
 }
 
-void MatchPhotos(Workspace& workspace, const std::filesystem::path& database, Matching matching,
-                 double memory_gb, std::uint64_t seed, const std::optional<ImagePairs>& allowed) {
+void MatchPhotos(sfm::Workspace& workspace, const std::filesystem::path& database,
+                 sfm::Matching matching, double memory_gb, std::uint64_t seed,
+                 const std::optional<sfm::ImagePairs>& allowed) {
   const int threads = MatchingThreads(memory_gb);
   if (const auto pairs = PairsToMatch(workspace, matching, memory_gb, allowed)) {
     std::vector<std::pair<std::string, std::string>> names;
@@ -115,9 +107,9 @@ void MatchPhotos(Workspace& workspace, const std::filesystem::path& database, Ma
     MatchPairs(workspace, database, names, threads, seed);
     return;
   }
-  const bool sequential = matching == Matching::kSequential;
-  Arguments arguments = MatcherArguments(
-      workspace, sequential ? "sequential_matcher" : "exhaustive_matcher", database, threads, seed);
+  const bool sequential = matching == sfm::Matching::kSequential;
+  Arguments arguments = MatcherArguments(sequential ? "sequential_matcher" : "exhaustive_matcher",
+                                         database, threads, seed);
   if (sequential) {
     arguments.Add({"SequentialMatching.overlap"}, std::to_string(kSequentialOverlap))
         .Add({"SequentialMatching.quadratic_overlap"}, "1");

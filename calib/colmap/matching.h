@@ -1,28 +1,23 @@
-// calib/colmap/matching.h -- which photos are matched with which, and the matching.
+// calib/colmap/matching.h -- matching by COLMAP.
 #pragma once
 #include <optional>
 #include <utility>
 #include <vector>
 
-#include "calib/colmap/workspace.h"
+#include "calib/colmap/program.h"
+#include "calib/sfm/run/feature_plan.h"
 
 namespace dtr::colmap {
-
-/// kAuto resolved for a number of photos; other values unchanged.
-Matching ResolveMatching(Matching matching, size_t images);
-
-/// Numbers of two photos, a < b; sorted.
-using ImagePairs = std::vector<std::pair<size_t, size_t>>;
 
 /// Matches the photos of `database`; an interrupted call may be repeated on the same database. Of
 /// the pairs that `matching` names only those of `allowed`, where it is given. Threads, and photos
 /// held at a time, are bounded by `memory_gb` (GB of 1e9 bytes).
-void MatchPhotos(Workspace& workspace, const std::filesystem::path& database, Matching matching,
-                 double memory_gb, std::uint64_t seed,
-                 const std::optional<ImagePairs>& allowed = {});
+void MatchPhotos(sfm::Workspace& workspace, const std::filesystem::path& database,
+                 sfm::Matching matching, double memory_gb, std::uint64_t seed,
+                 const std::optional<sfm::ImagePairs>& allowed = {});
 
 /// Matches listed pairs of photos, given by their names in the database.
-void MatchPairs(Workspace& workspace, const std::filesystem::path& database,
+void MatchPairs(sfm::Workspace& workspace, const std::filesystem::path& database,
                 const std::vector<std::pair<std::string, std::string>>& pairs, int threads,
                 std::uint64_t seed);
 

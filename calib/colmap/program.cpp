@@ -5,6 +5,8 @@
 
 #include <sstream>
 
+#include "calib/colmap/model_io.h"
+#include "calib/sfm/run/sfm_steps.h"
 #include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/process.h"
@@ -74,7 +76,7 @@ std::string HowItEnded(const ProcessResult& result) {
 
 bool Program::IsInstalled() { return !FindProgram(kProgram).empty(); }
 
-Program::State Program::Find() {
+sfm::ColmapState Program::Find() {
   if (!IsInstalled()) return {};
   try {
     return {Program().version(), ""};
@@ -118,8 +120,7 @@ const char* Program::FindOption(const std::string& command,
   return nullptr;
 }
 
-Arguments::Arguments(Program& program, const std::string& command)
-    : program_(program), command_(command), argv_{kProgram, command} {}
+Arguments::Arguments(const std::string& command) : command_(command), argv_{kProgram, command} {}
 
 Arguments& Arguments::Add(std::initializer_list<const char*> names, const std::string& value) {
   const char* name = program_.FindOption(command_, names);
@@ -139,7 +140,14 @@ Arguments& Arguments::AddIfKnown(std::initializer_list<const char*> names,
   return program_.FindOption(command_, names) == nullptr ? *this : Add(names, value);
 }
 
-void RunColmap(const std::vector<std::string>& argv, StepRecord& record,
+void AllowForwardMotion(Arguments& arguments) {
+  arguments.AddIfKnown({"Mapper.init_max_forward_motion"}, "1")
+      .AddIfKnown({"Mapper.init_min_tri_angle"}, "2")
+      .AddIfKnown({"Mapper.filter_min_tri_angle"}, "0.5")
+      .AddIfKnown({"Mapper.abs_pose_min_num_inliers"}, std::to_string(sfm::kMinInliersForward));
+}
+
+void RunColmap(const std::vector<std::string>& argv, sfm::StepRecord& record,
                const std::function<void(const std::string&)>& on_line, Progress& progress) {
   progress.ThrowIfInterrupted();
   record.argv = argv;
@@ -164,6 +172,20 @@ void RunColmap(const std::vector<std::string>& argv, StepRecord& record,
       result.Ok() ? "expected all of its results in its database" : HowItEnded(result);
   throw Error(fmt::format("colmap {} ({}): {}: {}; see {}", argv.at(1), record.name, ended,
                           cause.Cause(), record.log_file.string()));
+}
+
+void RunStep(sfm::Workspace& workspace, const Arguments& arguments,
+             const std::function<void(const std::string&)>& on_line) {
+  workspace.RunProgram([&](sfm::StepRecord& record) {
+    RunColmap(arguments.argv(), record, on_line, workspace.progress());
+  });
+}
+
+calib::SfmModel ReadModelHere(const sfm::Workspace& workspace,
+                              const std::filesystem::path& folder) {
+  calib::SfmModel model = ReadModel(folder);
+  for (calib::SfmImage& image : model.images) image.name = workspace.NameOfAlias(image.name);
+  return model;  // aliases sort as the names do
 }
 
 }  // namespace dtr::colmap

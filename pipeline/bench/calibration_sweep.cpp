@@ -5,10 +5,10 @@
 #include <algorithm>
 
 #include "calib/bundle/held_out.h"
-#include "calib/colmap/matching.h"
-#include "calib/colmap/pairs.h"
 #include "calib/colmap/program.h"
 #include "calib/reference_tracks/score.h"
+#include "calib/sfm/matching/pair_choice.h"
+#include "calib/sfm/run/feature_plan.h"
 #include "capture/duplicates.h"
 #include "capture/ingest.h"
 #include "dtr/base/error.h"
@@ -74,22 +74,22 @@ std::vector<calib::Track> ReferenceTracksOf(const capture::Capture& photos, cons
 
 /// Where a preselection keeps every pair there is nothing to choose.
 std::vector<std::string> MatchingValues(size_t photos) {
-  const colmap::Matching own = colmap::ResolveMatching(colmap::Matching::kAuto, photos);
-  std::vector<std::string> values{colmap::NameOf(own)};
-  for (const auto matching : {colmap::Matching::kExhaustive, colmap::Matching::kPreselected}) {
-    if (matching != own && photos > colmap::kNeighbours + 1) {
-      values.emplace_back(colmap::NameOf(matching));
+  const sfm::Matching own = sfm::ResolveMatching(sfm::Matching::kAuto, photos);
+  std::vector<std::string> values{sfm::NameOf(own)};
+  for (const auto matching : {sfm::Matching::kExhaustive, sfm::Matching::kPreselected}) {
+    if (matching != own && photos > sfm::matching::kPartners + 1) {
+      values.emplace_back(sfm::NameOf(matching));
     }
   }
-  values.emplace_back(colmap::NameOf(colmap::Matching::kSequential));
+  values.emplace_back(sfm::NameOf(sfm::Matching::kSequential));
   return values;
 }
 
 /// Without COLMAP there is one engine.
 std::vector<std::string> EngineValues() {
-  std::vector<std::string> values{colmap::NameOf(colmap::SfmEngine::kGlobal)};
+  std::vector<std::string> values{sfm::NameOf(sfm::SfmEngine::kGlobal)};
   if (colmap::Program::IsInstalled()) {
-    values.emplace_back(colmap::NameOf(colmap::SfmEngine::kColmap));
+    values.emplace_back(sfm::NameOf(sfm::SfmEngine::kColmap));
   }
   return values;
 }
@@ -125,14 +125,14 @@ const std::string& CalibrationSweep::Value(const eval::SweepSetting& setting, si
 SfmChoice CalibrationSweep::ChoiceOf(const eval::SweepSetting& setting) const {
   SfmChoice choice;
   choice.feature_size_px = std::stoi(Value(setting, kFeatureSize));
-  choice.engine = Value(setting, kSfm) == colmap::NameOf(colmap::SfmEngine::kColmap)
-                      ? colmap::SfmEngine::kColmap
-                      : colmap::SfmEngine::kGlobal;
+  choice.engine = Value(setting, kSfm) == sfm::NameOf(sfm::SfmEngine::kColmap)
+                      ? sfm::SfmEngine::kColmap
+                      : sfm::SfmEngine::kGlobal;
   const std::string& features = Value(setting, kFeatures);
   choice.features = features == kMax ? MaxFeaturesOf(choice.engine) : std::stoi(features);
-  for (const auto matching : {colmap::Matching::kExhaustive, colmap::Matching::kPreselected,
-                              colmap::Matching::kSequential}) {
-    if (Value(setting, kMatching) == colmap::NameOf(matching)) choice.matching = matching;
+  for (const auto matching :
+       {sfm::Matching::kExhaustive, sfm::Matching::kPreselected, sfm::Matching::kSequential}) {
+    if (Value(setting, kMatching) == sfm::NameOf(matching)) choice.matching = matching;
   }
   choice.lens_model = Value(setting, kCameraModel);
   return choice;
@@ -170,8 +170,8 @@ eval::SweepMeasurement CalibrationSweep::Measure(const eval::SweepSetting& setti
 }
 
 std::string CalibrationSweep::Identity() const {
-  std::string identity = InputHash(options_.photos) + " " + colmap::kOwnVersion;
-  const colmap::Program::State program = colmap::Program::Find();
+  std::string identity = InputHash(options_.photos) + " " + sfm::kOwnVersion;
+  const sfm::ColmapState program = colmap::Program::Find();
   if (program.Works()) identity += " " + program.version;
   return identity;
 }

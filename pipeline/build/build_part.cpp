@@ -38,7 +38,7 @@ std::vector<BuildStage> BuildStages(const BuildOptions& asked) {
   RequireShareable(options);
   std::vector<BuildStage> stages = {{"capture", false}};
   // COLMAP looks for features and matches in a process of its own, all at once.
-  if (options.sfm.engine != colmap::SfmEngine::kColmap &&
+  if (options.sfm.engine != sfm::SfmEngine::kColmap &&
       NeedsFeatures(options.poses, options.poses_format)) {
     stages.insert(
         stages.end(),

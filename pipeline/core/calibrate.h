@@ -44,7 +44,7 @@ struct CalibrateOptions {
   std::string advice =
       {};  ///< what helps where cameras are not determined; CalibratePhotos sets it
   /// A part of structure from motion: CalibratePhotos does this alone and throws PartDone.
-  std::optional<colmap::SfmPart> part = {};
+  std::optional<sfm::SfmPart> part = {};
 };
 
 /// Calibrated photos, frozen: everything later depends on this model alone.

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 #include "dtr/base/error.h"
 
 namespace dtr::pipeline {

@@ -2,7 +2,7 @@
 #pragma once
 #include <string>
 
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 
 namespace dtr::pipeline {
 
@@ -14,11 +14,11 @@ const char* NameOf(CameraPer per);
 /// How structure from motion goes about it. Each choice decides the result; docs/accuracy/SPEED.md
 /// has what they cost and what they are worth.
 struct SfmChoice {
-  colmap::SfmEngine engine = colmap::SfmOptions().engine;
+  sfm::SfmEngine engine = sfm::SfmOptions().engine;
   int feature_size_px = 0;  ///< long side of the photos for features; 0: from the memory
   int features = 0;         ///< max per photo; 0: what a preset says, else the engine's max
-  colmap::Matching matching = colmap::Matching::kAuto;
-  std::string lens_model = colmap::SfmOptions().lens_model;
+  sfm::Matching matching = sfm::Matching::kAuto;
+  std::string lens_model = sfm::SfmOptions().lens_model;
   CameraPer camera_per = CameraPer::kAuto;
 
   bool operator==(const SfmChoice&) const = default;

@@ -94,7 +94,7 @@ Reader OpenDatabase(const fs::path& folder) {
   sqlite3_close(database);
   return {file, {ReadFile(file, kSeedLimitBytes)}, [=] {
             colmap::ReadDatabaseIds(file);
-            colmap::ReadDatabaseMatches(file);
+            colmap::ReadFeatureCounts(file);
             colmap::ForEachMatchedPair(file, [](const auto&) {});
           }};
 }

@@ -6,10 +6,11 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/run_record.h"
-#include "pipeline/core/depth/quality_json.h"
-#include "pipeline/core/depth_settings.h"
-#include "pipeline/core/photos/rig_timestamps.h"
-#include "pipeline/prune/detail/prune_journal.h"
+#include "pipeline/depth_settings.h"
+#include "pipeline/detail/boards/rig_timestamps.h"
+#include "pipeline/detail/depth/quality_json.h"
+#include "pipeline/detail/run/prune_journal.h"
+#include "tests/calib/sfm/run/some_graph.h"
 #include "tests/fuzz/readers.h"
 
 namespace dtr::fuzz {
@@ -100,10 +101,35 @@ Reader OpenEffort(const fs::path& folder) {
           }};
 }
 
+Reader OpenSfmFeatures(const fs::path& folder) {
+  const fs::path file = folder / "features.bin";
+  sfm::testing::WriteSomeFeatures(file);
+  return {file, {ReadFile(file, kSeedLimitBytes)}, [=] {
+            const sfm::FeatureFile read(file);
+            read.Of(0);
+            read.Of(1);
+          }};
+}
+
+Reader OpenSfmMatches(const fs::path& folder) {
+  const fs::path file = folder / "matches.bin", features = folder / "features.bin";
+  sfm::testing::WriteSomeFeatures(features);
+  sfm::WriteMatches(file, sfm::testing::SomeGraph());
+  return {file, {ReadFile(file, kSeedLimitBytes)}, [=] {
+            sfm::ReadMatches(file, sfm::FeatureFile(features),
+                             std::vector<std::string>{"a.jpg", "b.jpg"});
+          }};
+}
+
 constexpr ReaderKind kReaders[] = {
-    {"bench", OpenBench},          {"effort", OpenEffort},
-    {"run-record", OpenRunRecord}, {"prune-journal", OpenPruneJournal},
-    {"sweep", OpenSweep},          {"rig-timestamps", OpenTimestamps},
+    {"bench", OpenBench},
+    {"effort", OpenEffort},
+    {"run-record", OpenRunRecord},
+    {"prune-journal", OpenPruneJournal},
+    {"sweep", OpenSweep},
+    {"rig-timestamps", OpenTimestamps},
+    {"sfm-features", OpenSfmFeatures},
+    {"sfm-matches", OpenSfmMatches},
 };
 
 }  // namespace

@@ -95,7 +95,7 @@ calib::SfmModel ModelWithFocal(double focal_px) {
 }
 
 TEST(ExifFocal, OnlyWhatRoundingCannotExplainContradictsIt) {
-  const std::vector<colmap::SfmImageInput> photos{
+  const std::vector<sfm::SfmImageInput> photos{
       {"a.jpg", 800, 600, 889.0}, {"b.jpg", 800, 600, 889.0}, {"c.jpg", 800, 600, {}}};
   EXPECT_FALSE(ContradictsExif(ModelWithFocal(900), photos));
   EXPECT_FALSE(ContradictsExif(ModelWithFocal(1000), photos));

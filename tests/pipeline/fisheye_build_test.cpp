@@ -39,7 +39,7 @@ class Fisheye : public dtr::testing::DatasetOnce {
       if (!exif) photo.focal_prior_px.reset();
     }
     CalibrateOptions options;
-    options.sfm.engine = colmap::SfmEngine::kGlobal;
+    options.sfm.engine = sfm::SfmEngine::kGlobal;
     options.sfm.lens_model = lens_model;
     return CalibratePhotos(photos, options, *folder_ / (lens_model + (exif ? "" : "_alone")),
                            silent);

@@ -53,7 +53,7 @@ class GivenCameras : public dtr::testing::DatasetOnce {
     options.poses = *folder_ / (name + ".json");
     options.output = *folder_ / (name + ".dtr");
     options.depth.engine = "none";
-    options.sfm.engine = colmap::SfmEngine::kGlobal;
+    options.sfm.engine = sfm::SfmEngine::kGlobal;
     options.refine_poses = refine;
     NotedLines lines;
     Built built;

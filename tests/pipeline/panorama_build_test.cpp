@@ -46,7 +46,7 @@ class PanoramaBuild : public dtr::testing::DatasetOnce {
     options.photos = *folder_ / "walk/panoramas";
     options.output = *folder_ / (name + ".dtr");
     options.depth.engine = "none";
-    options.sfm.engine = colmap::SfmEngine::kGlobal;
+    options.sfm.engine = sfm::SfmEngine::kGlobal;
     return options;
   }
 };
@@ -195,7 +195,7 @@ TEST_F(PanoramaBuild, WhatDoesNotGoWithPanoramasIsRejectedBeforeAnyWork) {
   EXPECT_THAT(message(options), HasSubstr("leave out `gps` and `distance`; dtr calibrate scale "
                                           "takes the finished set"));
   options = Options("no");
-  options.sfm.engine = colmap::SfmEngine::kColmap;
+  options.sfm.engine = sfm::SfmEngine::kColmap;
   EXPECT_THAT(message(options), HasSubstr("COLMAP 3.8 cannot hold one; use `sfm` auto or global"));
 }
 

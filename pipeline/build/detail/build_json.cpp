@@ -18,9 +18,9 @@ using Json = nlohmann::ordered_json;
 Json JsonOf(const SfmChoice& choice) {
   Json json{{"feature_size_px", choice.feature_size_px},
             {"features", choice.features},
-            {"matching", colmap::NameOf(choice.matching)},
+            {"matching", sfm::NameOf(choice.matching)},
             {"lens_model", choice.lens_model},
-            {"engine", colmap::NameOf(choice.engine)}};
+            {"engine", sfm::NameOf(choice.engine)}};
   // Builds that were begun before there was a choice go on.
   if (choice.camera_per != CameraPer::kAuto) json["camera_per"] = NameOf(choice.camera_per);
   return json;

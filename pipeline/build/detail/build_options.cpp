@@ -79,7 +79,7 @@ void RequirePanoramaOptions(const BuildOptions& options) {
       options.metres.any(),
       "leave out `gps` and `distance`; dtr calibrate scale takes the finished set, with the folder "
       "of the panoramas or with distances");
-  reject(options.sfm.engine == colmap::SfmEngine::kColmap,
+  reject(options.sfm.engine == sfm::SfmEngine::kColmap,
          "COLMAP 3.8 cannot hold one; use `sfm` auto or global");
 }
 

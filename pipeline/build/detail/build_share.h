@@ -38,8 +38,8 @@ class BuildShare {
   }
 
   /// Of each stage what this process does.
-  std::optional<colmap::SfmPart> Sfm() const {
-    return part_ ? SfmPartOf(*part_) : std::optional<colmap::SfmPart>();
+  std::optional<sfm::SfmPart> Sfm() const {
+    return part_ ? SfmPartOf(*part_) : std::optional<sfm::SfmPart>();
   }
   Part Undistortion() const {
     if (Is("undistortion")) return part_->part;

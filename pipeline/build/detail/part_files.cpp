@@ -82,15 +82,15 @@ bool IsShared(const BuildPart& part, const std::vector<BuildStage>& stages) {
   });
 }
 
-std::optional<colmap::SfmPart> SfmPartOf(const BuildPart& part) {
-  using Stage = colmap::SfmStage;
+std::optional<sfm::SfmPart> SfmPartOf(const BuildPart& part) {
+  using Stage = sfm::SfmStage;
   constexpr std::pair<const char*, Stage> kStages[] = {{"capture", Stage::kPhotos},
                                                        {"features", Stage::kFeatures},
                                                        {"pairs", Stage::kPairs},
                                                        {"matching", Stage::kMatching},
                                                        {"verification", Stage::kVerification}};
   for (const auto& [name, stage] : kStages) {
-    if (part.stage == name) return colmap::SfmPart{stage, part.part};
+    if (part.stage == name) return sfm::SfmPart{stage, part.part};
   }
   return std::nullopt;
 }

@@ -19,7 +19,7 @@ void RequirePart(const BuildPart& part, const std::vector<BuildStage>& stages);
 bool IsShared(const BuildPart& part, const std::vector<BuildStage>& stages);
 
 /// Which part of structure from motion that is; nothing where it is of a later stage.
-std::optional<colmap::SfmPart> SfmPartOf(const BuildPart& part);
+std::optional<sfm::SfmPart> SfmPartOf(const BuildPart& part);
 /// The same of depth; nothing where it is of an earlier stage. `passes`: of the engine.
 std::optional<DepthStagePart> DepthPartOf(const BuildPart& part, int passes);
 

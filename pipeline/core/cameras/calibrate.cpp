@@ -6,11 +6,12 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "calib/colmap/features.h"
 #include "calib/colmap/model_io.h"
 #include "calib/colmap/program.h"
-#include "calib/colmap/sfm.h"
+#include "calib/colmap/steps.h"
 #include "calib/models/fisheye.h"
+#include "calib/sfm/run/feature_plan.h"
+#include "calib/sfm/run/sfm.h"
 #include "capture/contents_json.h"
 #include "capture/image_circle.h"
 #include "capture/sfm_images.h"
@@ -39,7 +40,7 @@ capture::Capture Subset(const capture::Capture& capture, const std::vector<bool>
   return subset;
 }
 
-SfmSummary SummaryOf(const colmap::SfmReport& report, const calib::SfmModel& model) {
+SfmSummary SummaryOf(const sfm::SfmReport& report, const calib::SfmModel& model) {
   return {.mean_reprojection_error_px = report.mean_reprojection_error_px,
           .images_per_model = report.images_per_model,
           .lack_of_parallax = report.lack_of_parallax,
@@ -58,12 +59,12 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
   }
   const capture::Capture photos = Subset(capture, in_sfm);
   const CameraGroups groups(photos.photos, options.sfm.camera_per, options.rig || options.lens);
-  std::vector<colmap::SfmImageInput> inputs = SfmInputs(photos, groups, workspace / "photos");
-  for (colmap::SfmImageInput& input : inputs) {
+  std::vector<sfm::SfmImageInput> inputs = SfmInputs(photos, groups, workspace / "photos");
+  for (sfm::SfmImageInput& input : inputs) {
     if (!options.lens) break;
     input.known_lens = LensFor(*options.lens, input.width_px, input.height_px, input.name);
   }
-  colmap::SfmOptions sfm_options = SfmOptionsFor(options);
+  sfm::SfmOptions sfm_options = SfmOptionsFor(options);
   if (options.lens) {
     sfm_options.intrinsics_are_known = true;
     sfm_options.lens_model = calib::NameOf(options.lens->model);
@@ -74,8 +75,8 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
     sfm_options.lens_model = calib::NameOf(calib::CameraModel::kSimplePinhole);
   }
   PreparePhotos(photos, options, workspace / "photos", progress);
-  colmap::SfmResult sfm =
-      colmap::RunSfm(workspace / "photos", inputs, workspace / "sfm", sfm_options, progress);
+  sfm::SfmResult sfm =
+      sfm::RunSfm(workspace / "photos", inputs, workspace / "sfm", sfm_options, progress);
   if (panoramas) {
     CompletePanoramas(photos, *options.rig, inputs, workspace, sfm_options, sfm, progress);
   }
@@ -89,7 +90,7 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
   CalibratedPhotos calibrated;
   calibrated.engine = sfm.report.version;
   calibrated.why_not_registered = sfm.report.why_not_registered;
-  for (const colmap::StepRecord& step : sfm.report.steps) {
+  for (const sfm::StepRecord& step : sfm.report.steps) {
     // COLMAP's runs are no time of this process, nor are own steps that an earlier one did.
     if (!step.argv.empty() || step.from_checkpoint) calibrated.engine_cpu_s += step.cpu_s;
     if (!step.from_checkpoint) continue;
@@ -146,8 +147,8 @@ std::string ToJson(const CalibratedPhotos& calibrated, const capture::FolderCont
   return Text(json);
 }
 
-bool IsShared(const std::optional<colmap::SfmPart>& part) {
-  using Stage = colmap::SfmStage;
+bool IsShared(const std::optional<sfm::SfmPart>& part) {
+  using Stage = sfm::SfmStage;
   return part && part->stage != Stage::kPhotos && part->stage != Stage::kPairs;
 }
 
@@ -157,9 +158,9 @@ void PreparePhotos(const capture::Capture& photos, const CalibrateOptions& optio
   capture::PrepareSfmImages(photos, folder, 0, options.memory_gb, progress);
 }
 
-std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
-                                             const CameraGroups& groups, const fs::path& folder) {
-  std::vector<colmap::SfmImageInput> inputs;
+std::vector<sfm::SfmImageInput> SfmInputs(const capture::Capture& capture,
+                                          const CameraGroups& groups, const fs::path& folder) {
+  std::vector<sfm::SfmImageInput> inputs;
   for (const capture::Photo& photo : capture.photos) {
     inputs.push_back({photo.name, photo.width_px, photo.height_px, photo.focal_prior_px,
                       groups.GroupOf(photo), capture::SfmMaskFile(folder, photo),
@@ -171,8 +172,9 @@ std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
   return inputs;
 }
 
-colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options) {
-  colmap::SfmOptions sfm;
+sfm::SfmOptions SfmOptionsFor(const CalibrateOptions& options) {
+  sfm::SfmOptions sfm;
+  sfm.colmap = &colmap::kSteps;
   sfm.engine = options.sfm.engine;
   sfm.seed = options.seed;
   sfm.memory_gb = options.memory_gb;
@@ -188,11 +190,11 @@ colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options) {
 
 int FeatureImageSizePx(const std::vector<std::pair<int, int>>& sizes_px, double memory_gb,
                        int asked_px) {
-  std::vector<colmap::SfmImageInput> images;
+  std::vector<sfm::SfmImageInput> images;
   for (const auto& [width_px, height_px] : sizes_px) {
     images.push_back({"", width_px, height_px, {}, "", {}});
   }
-  return colmap::PlanExtraction(images, memory_gb, asked_px).max_image_size_px;
+  return sfm::PlanExtraction(images, memory_gb, asked_px).max_image_size_px;
 }
 
 bool NeedsFeatures(const fs::path& poses, const std::string& poses_format) {
@@ -205,10 +207,10 @@ void RequireCalibration(const fs::path& poses, const std::string& poses_format,
   if (sfm.features > MaxFeaturesOf(sfm.engine)) {
     throw UsageError(
         fmt::format("`features` {}: expected at most {}, the limit of `sfm` {}; give fewer",
-                    sfm.features, MaxFeaturesOf(sfm.engine), colmap::NameOf(sfm.engine)));
+                    sfm.features, MaxFeaturesOf(sfm.engine), sfm::NameOf(sfm.engine)));
   }
   if (!poses.empty()) (void)FormatOf(poses, poses_format, "`poses`");
-  if (sfm.engine == colmap::SfmEngine::kColmap && NeedsFeatures(poses, poses_format))
+  if (sfm.engine == sfm::SfmEngine::kColmap && NeedsFeatures(poses, poses_format))
     (void)colmap::Program();
 }
 

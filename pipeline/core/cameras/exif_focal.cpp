@@ -26,7 +26,7 @@ struct Attempt {
   int observations = 0;
 };
 
-Attempt Refined(const SfmRun& run, const CalibrateOptions& options, const colmap::SfmResult& sfm,
+Attempt Refined(const SfmRun& run, const CalibrateOptions& options, const sfm::SfmResult& sfm,
                 const std::string& sfm_model, const std::string& folder, Progress& progress) {
   Attempt attempt;
   attempt.fixed = options.fixed_intrinsics;
@@ -47,7 +47,7 @@ std::string WhyUndetermined(const SfmRun& run, const calib::SfmModel& model, Pro
 
 // A model that was mapped with EXIF's focal length: free where the observations determine it, and
 // then say what EXIF does.
-Attempt FromExif(const SfmRun& run, const CalibrateOptions& options, const colmap::SfmResult& sfm,
+Attempt FromExif(const SfmRun& run, const CalibrateOptions& options, const sfm::SfmResult& sfm,
                  const std::string& sfm_model, Progress& progress) {
   CalibrateOptions fixed = options;
   fixed.fixed_intrinsics = true;
@@ -70,10 +70,10 @@ std::string Line(const FocalContradiction& focal, const Attempt& taken, const At
 
 // The focal length that lies furthest from EXIF's, by more than `log_limit` in the logarithm.
 std::optional<FocalContradiction> FurthestFromExif(const calib::SfmModel& model,
-                                                   const std::vector<colmap::SfmImageInput>& photos,
+                                                   const std::vector<sfm::SfmImageInput>& photos,
                                                    double log_limit) {
   std::map<std::string, double> prior_of;
-  for (const colmap::SfmImageInput& photo : photos) {
+  for (const sfm::SfmImageInput& photo : photos) {
     if (photo.focal_prior_px) prior_of[photo.name] = *photo.focal_prior_px;
   }
   std::map<std::uint32_t, std::vector<double>> priors;
@@ -116,16 +116,16 @@ std::string Undetermined(const FocalContradiction& focal, const Attempt& exif) {
 // be: the one with EXIF's, where that is known of all photos. Empty: `sfm` is determined, or the
 // other is no rival.
 std::optional<PhotoRefinement> WithExifHeld(const SfmRun& run, const CalibrateOptions& options,
-                                            colmap::SfmResult& sfm, Progress& progress) {
+                                            sfm::SfmResult& sfm, Progress& progress) {
   const auto focal = FurthestFromExif(sfm.model, run.inputs, 0);
   if (!focal || WhyUndetermined(run, sfm.model, progress).empty()) return std::nullopt;
-  auto fixed_sfm = colmap::MapWithFixedIntrinsics(run.workspace / "photos", run.inputs,
-                                                  run.workspace / "sfm", run.sfm_options, progress);
+  auto fixed_sfm = sfm::MapWithFixedIntrinsics(run.workspace / "photos", run.inputs,
+                                               run.workspace / "sfm", run.sfm_options, progress);
   if (!fixed_sfm ||
       !IsEnough(fixed_sfm->model.images.size(), sfm.model.images.size(), kEnoughPhotos)) {
     return std::nullopt;
   }
-  Attempt exif = FromExif(run, options, *fixed_sfm, colmap::kFixedModel, progress);
+  Attempt exif = FromExif(run, options, *fixed_sfm, sfm::kFixedModel, progress);
   sfm.model = std::move(fixed_sfm->model);
   return Report(
       exif,
@@ -135,12 +135,12 @@ std::optional<PhotoRefinement> WithExifHeld(const SfmRun& run, const CalibrateOp
 
 }  // namespace
 
-std::optional<FocalContradiction> ContradictsExif(
-    const calib::SfmModel& model, const std::vector<colmap::SfmImageInput>& photos) {
+std::optional<FocalContradiction> ContradictsExif(const calib::SfmModel& model,
+                                                  const std::vector<sfm::SfmImageInput>& photos) {
   return FurthestFromExif(model, photos, std::log1p(kExifFocalError));
 }
 
-PhotoRefinement RefineSfm(const SfmRun& run, colmap::SfmResult& sfm, Progress& progress) {
+PhotoRefinement RefineSfm(const SfmRun& run, sfm::SfmResult& sfm, Progress& progress) {
   CalibrateOptions options = run.options;
   options.advice = sfm.report.lack_of_parallax;
   const bool given = options.rig || options.lens;
@@ -172,8 +172,8 @@ PhotoRefinement RefineSfm(const SfmRun& run, colmap::SfmResult& sfm, Progress& p
     }
   }
   ExifFocal focal{.exif_px = contradiction->exif_px, .found_px = contradiction->found_px};
-  auto fixed_sfm = colmap::MapWithFixedIntrinsics(run.workspace / "photos", run.inputs,
-                                                  run.workspace / "sfm", run.sfm_options, progress);
+  auto fixed_sfm = sfm::MapWithFixedIntrinsics(run.workspace / "photos", run.inputs,
+                                               run.workspace / "sfm", run.sfm_options, progress);
   if (!fixed_sfm ||
       !IsEnough(fixed_sfm->model.images.size(), sfm.model.images.size(), kEnoughPhotos)) {
     Attempt taken = Refined(run, options, sfm, "model", "refined", progress);
@@ -182,7 +182,7 @@ PhotoRefinement RefineSfm(const SfmRun& run, colmap::SfmResult& sfm, Progress& p
                       "with EXIF's fewer photos are registered; the found one is taken");
   }
   const bool undetermined = !WhyUndetermined(run, sfm.model, progress).empty();
-  Attempt exif = FromExif(run, options, *fixed_sfm, colmap::kFixedModel, progress);
+  Attempt exif = FromExif(run, options, *fixed_sfm, sfm::kFixedModel, progress);
   focal.exif_error_px = exif.error_px;
   if (!undetermined) {
     Attempt found = Refined(run, options, sfm, "model", "refined", progress);

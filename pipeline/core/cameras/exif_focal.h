@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "calib/colmap/sfm.h"
-#include "pipeline/core/cameras/photo_refinement.h"
-#include "pipeline/core/photos/camera_groups.h"
+#include "calib/sfm/run/sfm.h"
+#include "pipeline/detail/cameras/photo_refinement.h"
+#include "pipeline/detail/photos/camera_groups.h"
 
 namespace dtr::pipeline {
 
@@ -23,15 +23,15 @@ inline constexpr double kExifFocalError = 0.15;
 /// The camera of the model that is farthest from the median focal length that EXIF gives its
 /// photos, where that is more than kExifFocalError; empty where none is.
 std::optional<FocalContradiction> ContradictsExif(const calib::SfmModel& model,
-                                                  const std::vector<colmap::SfmImageInput>& photos);
+                                                  const std::vector<sfm::SfmImageInput>& photos);
 
 /// What RefineSfm needs to map and refine.
 struct SfmRun {
   const capture::Capture& capture;
   const CalibrateOptions& options;
   const CameraGroups& groups;
-  const std::vector<colmap::SfmImageInput>& inputs;
-  const colmap::SfmOptions& sfm_options;
+  const std::vector<sfm::SfmImageInput>& inputs;
+  const sfm::SfmOptions& sfm_options;
   std::filesystem::path workspace;
 };
 
@@ -39,6 +39,6 @@ struct SfmRun {
 /// mapped again with EXIF's, and that model is taken unless held-out observations of the first are
 /// predicted clearly better; where the observations do not determine a focal length either, EXIF's
 /// is held. `sfm` becomes what was taken; the report gets `exif_focal`; one line has both values.
-PhotoRefinement RefineSfm(const SfmRun& run, colmap::SfmResult& sfm, Progress& progress);
+PhotoRefinement RefineSfm(const SfmRun& run, sfm::SfmResult& sfm, Progress& progress);
 
 }  // namespace dtr::pipeline

@@ -33,15 +33,15 @@ std::vector<size_t> SomeOf(size_t photos) {
   return some;
 }
 
-std::vector<colmap::PosedImage> ByName(std::vector<colmap::PosedImage> images) {
+std::vector<sfm::PosedImage> ByName(std::vector<sfm::PosedImage> images) {
   std::sort(images.begin(), images.end(),
             [](const auto& a, const auto& b) { return a.name < b.name; });
   return images;
 }
 
-std::vector<calib::GivenCamera> CamerasOf(const std::vector<colmap::PosedImage>& images) {
+std::vector<calib::GivenCamera> CamerasOf(const std::vector<sfm::PosedImage>& images) {
   std::vector<calib::GivenCamera> cameras;
-  for (const colmap::PosedImage& image : images) {
+  for (const sfm::PosedImage& image : images) {
     cameras.push_back({image.name, image.camera, image.cam_from_world});
   }
   return cameras;
@@ -62,12 +62,12 @@ class WithoutNotes final : public Progress {
 };
 
 calib::ConventionReport TestAlone(const GivenPhotos& given,
-                                  const std::vector<colmap::PosedImage>& images,
+                                  const std::vector<sfm::PosedImage>& images,
                                   const std::vector<size_t>& some, Progress& progress) {
-  std::vector<colmap::PosedImage> matched;
+  std::vector<sfm::PosedImage> matched;
   for (const size_t i : some) matched.push_back(images[i]);
   WithoutNotes quiet(progress);
-  std::vector<calib::MatchedPair> pairs = colmap::MatchWithoutCameras(
+  std::vector<calib::MatchedPair> pairs = sfm::MatchWithoutCameras(
       given.workspace / "photos", matched, given.workspace / "conventions", given.sfm, quiet);
   for (calib::MatchedPair& pair : pairs) {
     pair.a = static_cast<int>(some[static_cast<size_t>(pair.a)]);
@@ -140,11 +140,11 @@ bool IsOfFullDisk(const Error& error) {
 }  // namespace
 
 TriangulatedCameras TriangulateAndTest(const GivenPhotos& given, Progress& progress) {
-  const std::vector<colmap::PosedImage> images = ByName(given.images);
+  const std::vector<sfm::PosedImage> images = ByName(given.images);
   TriangulatedCameras out;
   try {
-    colmap::SfmResult sfm = colmap::TriangulateWithPoses(
-        given.workspace / "photos", images, given.workspace / "sfm", given.sfm, progress);
+    sfm::SfmResult sfm = sfm::TriangulateWithPoses(given.workspace / "photos", images,
+                                                   given.workspace / "sfm", given.sfm, progress);
     out.conventions = calib::TestConventions(CamerasOf(images), sfm.matches);
     out.model = std::move(sfm.model);
   } catch (const Interrupted&) {
@@ -160,7 +160,7 @@ TriangulatedCameras TriangulateAndTest(const GivenPhotos& given, Progress& progr
     throw Error(std::string(error.what()) + "; " + calib::LineOf(report, given.file));
   }
   // COLMAP's matches are its own affair; its triangulation is tested by the set's points.
-  const bool by_colmap = given.sfm.engine == colmap::SfmEngine::kColmap;
+  const bool by_colmap = given.sfm.engine == sfm::SfmEngine::kColmap;
   if (!by_colmap && AreDoubtful(out.conventions)) {
     progress.Note(kNotFitting);
     out.conventions = TestAlone(given, images, SomeOf(images.size()), progress);

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "calib/bundle/refine.h"
-#include "calib/colmap/known_poses.h"
+#include "calib/sfm/run/known_poses.h"
 #include "calib/validation/conventions.h"
 #include "dtr/base/progress.h"
 #include "dtr/types/check.h"
@@ -18,9 +18,9 @@ namespace dtr::pipeline {
 
 struct GivenPhotos {
   std::string file;  ///< of the cameras, for messages
-  std::vector<colmap::PosedImage> images;
+  std::vector<sfm::PosedImage> images;
   std::filesystem::path workspace;  ///< images are in photos/
-  colmap::SfmOptions sfm;
+  sfm::SfmOptions sfm;
 };
 
 struct TriangulatedCameras {
@@ -28,7 +28,7 @@ struct TriangulatedCameras {
   calib::ConventionReport conventions;
 };
 
-/// Points of the photos with their cameras fixed (colmap::TriangulateWithPoses), and the test of
+/// Points of the photos with their cameras fixed (sfm::TriangulateWithPoses), and the test of
 /// the cameras by all matches, not only those that became points (calib/validation/conventions.h).
 /// Where these do not fit, or are too few, some photos are matched again without belief in any
 /// camera. A note reports cameras that do not fit. Throws as TriangulateWithPoses; the error then

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <map>
 
-#include "calib/colmap/held_out.h"
-#include "calib/colmap/known_poses.h"
 #include "calib/colmap/model_io.h"
+#include "calib/sfm/run/held_out.h"
+#include "calib/sfm/run/known_poses.h"
 #include "capture/sfm_images.h"
 #include "dtr/base/error.h"
 #include "dtr/base/file_names.h"
@@ -75,7 +75,7 @@ bool IsHeldOut(const std::string& name, const capture::Capture& capture,
 
 // Cameras as they were given; poses act on p_world - the recentred origin.
 struct Given {
-  std::map<std::string, colmap::PosedImage> by_name;
+  std::map<std::string, sfm::PosedImage> by_name;
   std::string first;  // of the file
   LengthUnit unit = LengthUnit::kUnknown;
   Eigen::Vector3d world_origin = Eigen::Vector3d::Zero();
@@ -132,13 +132,13 @@ std::optional<calib::ConventionReport> TestOfModel(const calib::SfmModel& model,
 CalibratedPhotos Triangulated(const Given& given, const capture::Capture& capture,
                               const CalibrateOptions& options, const fs::path& workspace,
                               Progress& progress) {
-  std::vector<colmap::PosedImage> sources, held_out;
+  std::vector<sfm::PosedImage> sources, held_out;
   capture::Capture source_photos;
   for (size_t i = 0; i < capture.photos.size(); ++i) {
     const capture::Photo& photo = capture.photos[i];
     const auto found = given.by_name.find(photo.name);
     if (found == given.by_name.end()) continue;
-    colmap::PosedImage posed = found->second;
+    sfm::PosedImage posed = found->second;
     posed.mask_file = capture::SfmMaskFile(workspace / "photos", photo);
     // As in structure from motion, cameras that are to be adjusted need their observations.
     const bool is_source = !options.held_out[i] || options.refine_poses;
@@ -154,7 +154,7 @@ CalibratedPhotos Triangulated(const Given& given, const capture::Capture& captur
   TriangulatedCameras triangulated = TriangulateAndTest(photos, progress);
   calibrated.model = std::move(triangulated.model);
   calibrated.report.given_cameras = std::move(triangulated.conventions);
-  for (const colmap::PosedImage& posed : held_out) {
+  for (const sfm::PosedImage& posed : held_out) {
     AddImage({0, posed.name, 0, posed.cam_from_world, {}}, posed.camera, calibrated.model);
   }
   RefineWhereAsked(options, true, calibrated, progress);
@@ -182,7 +182,7 @@ CalibratedPhotos FromModel(calib::SfmModel model, Given given, const capture::Ca
     for (const calib::SfmImage& image : model.images) {
       given.by_name.emplace(
           image.name,
-          colmap::PosedImage{image.name, model.cameras.at(image.camera_id), image.cam_from_world});
+          sfm::PosedImage{image.name, model.cameras.at(image.camera_id), image.cam_from_world});
     }
     return Triangulated(given, capture, options, workspace, progress);
   }
@@ -362,7 +362,7 @@ namespace {
 // Views of one panorama, found one by one, as the panorama stands. `points`: those they observe.
 void StandAsPanoramas(const SetRig& panoramas, const capture::Capture& held_out,
                       const std::map<std::uint64_t, calib::SfmPoint>& points,
-                      colmap::HeldOutResult& placed) {
+                      sfm::HeldOutResult& placed) {
   const auto photo_of = PhotosOfRig(panoramas, held_out);
   calib::SfmModel found;
   found.cameras = placed.cameras;
@@ -378,13 +378,13 @@ void StandAsPanoramas(const SetRig& panoramas, const capture::Capture& held_out,
 }  // namespace
 
 void RegisterHeldOutPhotos(const capture::Capture& held_out,
-                           const std::vector<colmap::SfmImageInput>& sources,
+                           const std::vector<sfm::SfmImageInput>& sources,
                            const CameraGroups& groups, const fs::path& workspace,
-                           const colmap::SfmOptions& options, const SetRig* panoramas,
+                           const sfm::SfmOptions& options, const SetRig* panoramas,
                            calib::SfmModel& model, Progress& progress) {
   if (held_out.photos.empty()) return;
   capture::PrepareSfmImages(held_out, workspace / "photos", 0, options.memory_gb, progress);
-  colmap::HeldOutResult placed = colmap::RegisterHeldOut(
+  sfm::HeldOutResult placed = sfm::RegisterHeldOut(
       workspace / "photos", SfmInputs(held_out, groups, workspace / "photos"), model, sources,
       workspace / "sfm", workspace / "held_out", options, progress);
   if (panoramas != nullptr) StandAsPanoramas(*panoramas, held_out, model.points, placed);

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 #include "dtr/io/formats/cameras_json.h"
 #include "pipeline/core/calibrate.h"
 #include "pipeline/core/photos/camera_groups.h"
@@ -14,13 +14,13 @@ namespace dtr::pipeline {
 
 /// Photos as COLMAP gets them, with the groups that share intrinsics; `folder` is what
 /// capture::PrepareSfmImages fills.
-std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
-                                             const CameraGroups& groups,
-                                             const std::filesystem::path& folder);
-colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options);
+std::vector<sfm::SfmImageInput> SfmInputs(const capture::Capture& capture,
+                                          const CameraGroups& groups,
+                                          const std::filesystem::path& folder);
+sfm::SfmOptions SfmOptionsFor(const CalibrateOptions& options);
 
 /// Whether other processes work in the folder of structure from motion at the same time.
-bool IsShared(const std::optional<colmap::SfmPart>& part);
+bool IsShared(const std::optional<sfm::SfmPart>& part);
 /// capture::PrepareSfmImages into `folder`, unless a process before did that for several.
 void PreparePhotos(const capture::Capture& photos, const CalibrateOptions& options,
                    const std::filesystem::path& folder, Progress& progress);
@@ -65,9 +65,9 @@ CalibratedPhotos FromKnownPoses(const capture::Capture& capture, const Calibrate
 /// photos are views of, or null: then all views of a panorama stand as it says, where most of them
 /// were found to be.
 void RegisterHeldOutPhotos(const capture::Capture& held_out,
-                           const std::vector<colmap::SfmImageInput>& sources,
+                           const std::vector<sfm::SfmImageInput>& sources,
                            const CameraGroups& groups, const std::filesystem::path& workspace,
-                           const colmap::SfmOptions& options, const SetRig* panoramas,
+                           const sfm::SfmOptions& options, const SetRig* panoramas,
                            calib::SfmModel& model, Progress& progress);
 
 }  // namespace dtr::pipeline

@@ -45,8 +45,8 @@ void TakeOut(const std::set<std::string>& names, calib::SfmModel& model) {
 }  // namespace
 
 void CompletePanoramas(const capture::Capture& capture, const SetRig& rig,
-                       const std::vector<colmap::SfmImageInput>& inputs, const fs::path& workspace,
-                       const colmap::SfmOptions& sfm_options, colmap::SfmResult& sfm,
+                       const std::vector<sfm::SfmImageInput>& inputs, const fs::path& workspace,
+                       const sfm::SfmOptions& sfm_options, sfm::SfmResult& sfm,
                        Progress& progress) {
   const auto photo_of = PhotosOfRig(rig, capture);
   const auto poses = calib::RigPosesOf(sfm.model, rig.known, photo_of);
@@ -58,8 +58,8 @@ void CompletePanoramas(const capture::Capture& capture, const SetRig& rig,
   }
   const size_t found_alone = sfm.model.images.size();
   calib::SfmModel model =
-      colmap::PointsOfMatches(workspace / "photos", inputs, workspace / "sfm", sfm_options,
-                              rig.known.lenses.front(), cam_from_world, progress);
+      sfm::PointsOfMatches(workspace / "photos", inputs, workspace / "sfm", sfm_options,
+                           rig.known.lenses.front(), cam_from_world, progress);
   std::map<std::string, std::string> why;
   for (bool changed = true; changed;) {
     std::set<std::string> poor;

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 #include "capture/photo.h"
 #include "pipeline/core/set_rig.h"
 
@@ -21,9 +21,8 @@ inline constexpr int kMinViewObservations = 60;
 /// left out, with the reason in sfm.report.why_not_registered. Throws Error where no two panoramas
 /// are left.
 void CompletePanoramas(const capture::Capture& capture, const SetRig& rig,
-                       const std::vector<colmap::SfmImageInput>& inputs,
-                       const std::filesystem::path& workspace,
-                       const colmap::SfmOptions& sfm_options, colmap::SfmResult& sfm,
-                       Progress& progress);
+                       const std::vector<sfm::SfmImageInput>& inputs,
+                       const std::filesystem::path& workspace, const sfm::SfmOptions& sfm_options,
+                       sfm::SfmResult& sfm, Progress& progress);
 
 }  // namespace dtr::pipeline

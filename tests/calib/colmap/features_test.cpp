@@ -12,6 +12,8 @@
 namespace dtr::colmap {
 namespace {
 
+using namespace sfm;
+
 namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;

@@ -1,4 +1,4 @@
-#include "calib/colmap/known_poses.h"
+#include "calib/sfm/run/known_poses.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -10,10 +10,11 @@
 #include <numbers>
 
 #include "calib/colmap/export.h"
-#include "calib/colmap/held_out.h"
 #include "calib/colmap/model_io.h"
-#include "calib/colmap/view_pyramids.h"
-#include "calib/colmap/workspace.h"
+#include "calib/colmap/steps.h"
+#include "calib/sfm/run/held_out.h"
+#include "calib/sfm/run/view_pyramids.h"
+#include "calib/sfm/run/workspace.h"
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/random.h"
@@ -25,6 +26,8 @@
 namespace dtr::colmap {
 namespace {
 
+using namespace sfm;
+
 namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::Each;
@@ -33,7 +36,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::SizeIs;
 
-const SfmOptions kByColmap{.engine = SfmEngine::kColmap};
+const SfmOptions kByColmap{.colmap = &kSteps, .engine = SfmEngine::kColmap};
 
 // Three photos that only a fake COLMAP will open, of two cameras.
 class KnownPosesWithFake : public ::testing::Test {

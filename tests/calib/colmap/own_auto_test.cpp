@@ -8,8 +8,9 @@
 #include <random>
 
 #include "calib/colmap/model_io.h"
-#include "calib/colmap/sfm.h"
-#include "calib/colmap/workspace.h"
+#include "calib/colmap/steps.h"
+#include "calib/sfm/run/sfm.h"
+#include "calib/sfm/run/workspace.h"
 #include "datasets/hard/hard_sets.h"
 #include "dtr/base/error.h"
 #include "dtr/io/formats/cameras_json.h"
@@ -23,6 +24,8 @@
 
 namespace dtr::colmap {
 namespace {
+
+using namespace sfm;
 
 using namespace testing;
 namespace fs = std::filesystem;
@@ -75,6 +78,7 @@ void WriteQuilt(const std::array<fs::path, 4>& photos, const fs::path& file) {
 class AutoSfm : public ::testing::Test {
  protected:
   AutoSfm() : truth_(PlazaTruth()) {
+    options_.colmap = &kSteps;
     options_.engine = SfmEngine::kAuto;
     options_.max_image_size_px = kSmallSidePx;
     options_.lens_model = "SIMPLE_PINHOLE";

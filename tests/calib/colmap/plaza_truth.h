@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "calib/colmap/export.h"
-#include "calib/colmap/known_poses.h"
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/known_poses.h"
+#include "calib/sfm/run/sfm.h"
 
 namespace dtr::colmap::testing {
 
@@ -25,8 +25,8 @@ inline constexpr double kRotationDeg = 0.3;
 inline const std::filesystem::path kPlaza = "datasets/plaza";  // tests run in the source folder
 
 struct Truth {
-  std::vector<PosedImage> images;
-  std::vector<SfmImageInput> inputs;
+  std::vector<sfm::PosedImage> images;
+  std::vector<sfm::SfmImageInput> inputs;
 
   const Pose& CamFromWorld(const std::string& name) const {
     for (const auto& image : images) {
@@ -41,7 +41,7 @@ inline Truth PlazaTruth() {
   const auto json = nlohmann::json::parse(in);
   Truth truth;
   for (const auto& view : json.at("views")) {
-    PosedImage image;
+    sfm::PosedImage image;
     image.name = view.at("name");
     image.camera = FromPinhole(PinholeCamera(view.at("width"), view.at("height"), view.at("fx"),
                                              view.at("fy"), view.at("cx"), view.at("cy")));

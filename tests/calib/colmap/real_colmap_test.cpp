@@ -2,10 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "calib/colmap/held_out.h"
-#include "calib/colmap/known_poses.h"
 #include "calib/colmap/model_io.h"
-#include "calib/colmap/sfm.h"
+#include "calib/colmap/steps.h"
+#include "calib/sfm/run/held_out.h"
+#include "calib/sfm/run/known_poses.h"
+#include "calib/sfm/run/sfm.h"
 #include "dtr/base/process.h"
 #include "tests/calib/colmap/model_test_support.h"
 #include "tests/calib/colmap/plaza_truth.h"
@@ -13,6 +14,8 @@
 
 namespace dtr::colmap {
 namespace {
+
+using namespace sfm;
 
 using namespace testing;
 
@@ -25,6 +28,7 @@ class RealColmap : public ::testing::Test {
   void SetUp() override {
     if (FindProgram("colmap").empty()) GTEST_SKIP() << "there is no colmap on the PATH";
     truth_ = PlazaTruth();
+    options_.colmap = &kSteps;
     options_.engine = SfmEngine::kColmap;
     options_.max_image_size_px = kSidePx;
     options_.lens_model = "SIMPLE_PINHOLE";

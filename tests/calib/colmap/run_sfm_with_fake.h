@@ -10,8 +10,9 @@
 #include <vector>
 
 #include "calib/colmap/model_io.h"
-#include "calib/colmap/sfm.h"
-#include "calib/colmap/workspace.h"
+#include "calib/colmap/steps.h"
+#include "calib/sfm/run/sfm.h"
+#include "calib/sfm/run/workspace.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "tests/calib/colmap/fake_colmap.h"
@@ -45,7 +46,8 @@ class RunSfmWithFake : public ::testing::Test {
       WriteFileAtomically(photos_ / name, std::string("photo ") + name);
       images_.push_back({name, 640, 480, 500.0, "camera one"});
     }
-    options_.engine = SfmEngine::kColmap;
+    options_.colmap = &kSteps;
+    options_.engine = sfm::SfmEngine::kColmap;
     fake_.LeaveDatabase(Aliases());
     LeaveModel(0, 2);
     LeaveModel(1, 3);
@@ -58,7 +60,7 @@ class RunSfmWithFake : public ::testing::Test {
     for (size_t i = 0; i < count; ++i) {
       calib::SfmImage image;
       image.id = static_cast<std::uint32_t>(i + 1);
-      image.name = Workspace::AliasFor("", i, sorted_[i]);
+      image.name = sfm::Workspace::AliasFor("", i, sorted_[i]);
       image.camera_id = 1;
       image.features.push_back({{320 + static_cast<double>(i), 240}, 9});
       model.images.push_back(image);
@@ -82,13 +84,13 @@ class RunSfmWithFake : public ::testing::Test {
   std::vector<std::string> Aliases() const {
     std::vector<std::string> aliases;
     for (size_t i = 0; i < sorted_.size(); ++i) {
-      aliases.push_back(Workspace::AliasFor("", i, sorted_[i]));
+      aliases.push_back(sfm::Workspace::AliasFor("", i, sorted_[i]));
     }
     return aliases;
   }
 
-  SfmResult Run() {
-    return RunSfm(photos_.path(), images_, workspace_ / "sfm", options_, listener_);
+  sfm::SfmResult Run() {
+    return sfm::RunSfm(photos_.path(), images_, workspace_ / "sfm", options_, listener_);
   }
 
   std::string MessageOfRun() {
@@ -103,8 +105,8 @@ class RunSfmWithFake : public ::testing::Test {
   std::vector<std::string> sorted_ = {"a b.jpg", "c.jpg", "d.png", "Über uns/b photo.JPG"};
   const dtr::testing::TemporaryFolder photos_, workspace_;
   FakeColmap fake_;
-  std::vector<SfmImageInput> images_;
-  SfmOptions options_;
+  std::vector<sfm::SfmImageInput> images_;
+  sfm::SfmOptions options_;
   Listener listener_;
 };
 

@@ -1,4 +1,4 @@
-#include "calib/colmap/sfm.h"
+#include "calib/sfm/run/sfm.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -8,10 +8,10 @@
 #include <mutex>
 
 #include "calib/colmap/features.h"
-#include "calib/colmap/held_out.h"
 #include "calib/colmap/matching.h"
 #include "calib/colmap/model_io.h"
-#include "calib/colmap/workspace.h"
+#include "calib/sfm/run/held_out.h"
+#include "calib/sfm/run/workspace.h"
 #include "dtr/base/error.h"
 #include "dtr/io/image_io.h"
 #include "tests/calib/colmap/fake_colmap.h"
@@ -20,6 +20,8 @@
 
 namespace dtr::colmap {
 namespace {
+
+using namespace sfm;
 
 namespace fs = std::filesystem;
 using ::testing::AllOf;
@@ -384,8 +386,7 @@ TEST_F(RunSfmWithFake, AbsentPhotoIsNamed) {
 
 TEST(Program, LaterVersionsAreSpokenToInTheirWords) {
   const testing::FakeColmap fake(true);
-  Program program;
-  Arguments arguments(program, "feature_extractor");
+  Arguments arguments("feature_extractor");
   arguments.Add({"SiftExtraction.use_gpu", "FeatureExtraction.use_gpu"}, "0")
       .AddIfKnown({"random_seed", "default_random_seed"}, "5")
       .AddIfKnown({"no_such_option"}, "1");

@@ -1,0 +1,44 @@
+// calib/sfm/run/sfm_steps.h -- the steps that structure from motion and triangulation share.
+#pragma once
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calib/sfm/run/feature_plan.h"
+#include "calib/sfm/run/match_summary.h"
+#include "calib/sfm/run/workspace.h"
+
+namespace dtr::sfm {
+
+/// The lens model of the options. Throws UsageError on an unknown name.
+calib::CameraModel CameraModelOf(const SfmOptions& options);
+
+/// COLMAP's with kColmap, else kOwnVersion: the version of a workspace. Throws Error where COLMAP
+/// is needed and does not work.
+std::string VersionOf(const SfmOptions& options);
+
+/// What matching found, by whatever engine.
+MatchSummary MatchedIn(const Workspace& workspace, const SfmOptions& options);
+
+/// Steps "features" and "matches" of the workspace. What was planned goes to `report`.
+/// Of the pairs that options.matching names only those of `allowed` (a < b, sorted; numbers of
+/// images()) are matched, where it is given. `known_lenses`: the groups' parameters are given, not
+/// guesses.
+void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& groups,
+                        const SfmOptions& options, SfmReport& report,
+                        const std::optional<ImagePairs>& allowed = {}, bool known_lenses = false);
+
+/// Fills in what every report has: runs, version, who did not register, the error; writes it.
+void CompleteReport(const Workspace& workspace, const calib::SfmModel& model, SfmReport& report);
+
+/// File in the workspace of a model that RunSfm needed them for: what is registered in it needs
+/// them, too.
+inline constexpr char kForwardMotionNote[] = "forward_motion";
+/// Lies in a workspace whose mapper made a model with the intrinsics fixed at EXIF's alone.
+inline constexpr char kFixedIntrinsicsNote[] = "fixed_intrinsics";
+
+/// Points that must agree with the place of a photo: COLMAP's own limit, and that of such a walk.
+inline constexpr int kMinInliers = 30, kMinInliersForward = 15;
+
+}  // namespace dtr::sfm
