@@ -14,6 +14,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/lower_case.h"
+#include "dtr/io/set_io.h"
 #include "pipeline/export/export_web.h"
 #include "pipeline/prune/prune.h"
 

@@ -8,6 +8,7 @@
 #include "capture/contents_json.h"
 #include "cli/command.h"
 #include "cli/number_checks.h"
+#include "pipeline/core/camera_file.h"
 
 namespace dtr::cli {
 namespace {

@@ -89,7 +89,7 @@ std::vector<size_t> PartnersOf(Workspace& workspace, const Frozen& frozen, Small
   for (size_t i = 0; i < partners.size(); ++i) partners[i] = i;
   if (partners.size() > kExhaustiveLimit) {
     const std::vector<fs::path> file{workspace.FileOf(0)};
-    const Features own = std::move(SmallFeaturesOf(file, 1, 0, workspace.progress()).front());
+    const Features own = std::move(SmallFeaturesOf(file, 0, workspace.progress()).front());
     partners = MostResembling(own, small.Of(workspace.progress()));
   }
   return partners;

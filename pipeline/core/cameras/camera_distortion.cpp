@@ -15,8 +15,7 @@ class LensDistortion final : public CameraDistortion {
       : lens_(CameraModelOf(named)), onto_(named.camera), map_(lens_) {}
 
   void Undistort(ImageRgb8& image, Mask& mask) const override {
-    constexpr int kOneThread = 1;  // views are read side by side
-    calib::UndistortedPhoto flat = calib::Undistort(image, mask, lens_, onto_, 0, kOneThread);
+    calib::UndistortedPhoto flat = calib::Undistort(image, mask, lens_, onto_, 0);
     image = std::move(flat.image);
     mask = std::move(flat.mask);
   }

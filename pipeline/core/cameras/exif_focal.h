@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "calib/sfm/run/sfm.h"
-#include "pipeline/detail/cameras/photo_refinement.h"
-#include "pipeline/detail/photos/camera_groups.h"
+#include "pipeline/core/cameras/photo_refinement.h"
+#include "pipeline/core/photos/camera_groups.h"
 
 namespace dtr::pipeline {
 

@@ -22,7 +22,7 @@ constexpr std::ptrdiff_t kSure = 3;
 // shows it at this long side, too.
 constexpr int kLongSidePx = 1600;
 
-calib::BoardCheck Check(const ImageRgb8& image, const calib::Board& board) {
+calib::BoardCheck LookForBoard(const ImageRgb8& image, const calib::Board& board) {
   const Grid<std::uint8_t> grey = calib::GreyOf(image);
   const auto [width, height] = TargetSize(grey.width(), grey.height(), kLongSidePx);
   if (width == grey.width()) return calib::CheckBoard(grey, board);
@@ -44,7 +44,7 @@ void RequireGivenBoard(const std::string& where, const calib::Board& board, std:
       if (image >= images) return;
       looked[at] = true;
       try {
-        next[at] = Check(load(image * count / images), board);
+        next[at] = LookForBoard(load(image * count / images), board);
       } catch (const Error&) {
         // Is reported where every image is read.
       }

@@ -53,8 +53,8 @@ int StepFor(const DtrSet& set) {
 
 // The first point of every voxel with that side.
 std::vector<Eigen::Vector3d> OnePerVoxel(const std::vector<Eigen::Vector3d>& points, double side) {
-  using Voxel = std::array<std::int64_t, 3>;
-  std::vector<std::pair<Voxel, size_t>> voxels;
+  using VoxelIndex = std::array<std::int64_t, 3>;
+  std::vector<std::pair<VoxelIndex, size_t>> voxels;
   voxels.reserve(points.size());
   for (size_t i = 0; i < points.size(); ++i) {
     Voxel voxel;
