@@ -19,6 +19,7 @@
 #include "dtr/base/files.h"
 #include "dtr/base/machine.h"
 #include "dtr/base/memory_budget.h"
+#include "dtr/base/parallel_for.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/validation_result.h"
 #include "dtr/render/frame_memory.h"
@@ -191,8 +192,7 @@ Json ReportJson(const viewer::AppReport& report) {
 }
 
 /// Each camera's held-out error against the limit for the worst one.
-std::map<std::string, viewer::ViewValidation> ValidateViews(const Options& options,
-                                                            const Context& context) {
+std::map<std::string, viewer::ViewValidation> ValidateViews(const Options& options) {
   const DtrSet set = io::ReadSet(options.set);
   std::map<std::string, viewer::ViewValidation> validations;
   if (!set.sparse_file) return validations;  // nothing to validate by
@@ -264,7 +264,10 @@ viewer::Host MakeHost(const Options& options, const Context& context, PromptEnd&
   host.command_line = [&](const viewer::OpenedSet& opened, const viewer::ToDraw& wanted) {
     return CommandLine(options, opened, wanted);
   };
-  host.validations = [&] { return ValidateViews(options, context); };
+  host.validations = [&] {
+    const ThreadLimit limit(context.common.threads);  // it runs on a thread of its own
+    return ValidateViews(options);
+  };
   host.say = [&](const std::string& line) { context.console.Note(line); };
   if (!options.state_file.empty()) {
     host.state_changed = [&, last = std::string()](const viewer::AppState& state) mutable {
@@ -282,7 +285,7 @@ gl::Drawer DrawerOf(const std::string& renderer) {
   return renderer == "simd" ? gl::Drawer::kSimd : gl::Drawer::kFitting;
 }
 
-viewer::AppSettings SettingsOf(const Options& options, const Context& context, const DtrSet& set) {
+viewer::AppSettings SettingsOf(const Options& options, const DtrSet& set) {
   viewer::AppSettings settings;
   settings.hidden = pipeline::ResolveViewNames(AtFrame(set, options.time_step), options.exclude);
   const PinholeCamera size = pipeline::WithSize({1280, 800, 1, 1, 0, 0}, options.size);
@@ -344,7 +347,7 @@ int RunView(const Options& options, const Context& context, PromptEnd& end) {
   const std::string warning = io::ValidationWarning(set);
   if (!warning.empty()) context.console.Note(warning);
   const viewer::AppReport report =
-      viewer::RunViewer(SettingsOf(options, context, set), MakeHost(options, context, end));
+      viewer::RunViewer(SettingsOf(options, set), MakeHost(options, context, end));
   context.console.ThrowIfInterrupted();
   context.EmitJson(ReportJson(report).dump(1, ' ', false, Json::error_handler_t::replace));
   return kDone;

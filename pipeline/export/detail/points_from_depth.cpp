@@ -57,7 +57,7 @@ std::vector<Eigen::Vector3d> OnePerVoxel(const std::vector<Eigen::Vector3d>& poi
   std::vector<std::pair<VoxelIndex, size_t>> voxels;
   voxels.reserve(points.size());
   for (size_t i = 0; i < points.size(); ++i) {
-    Voxel voxel;
+    VoxelIndex voxel;
     for (int c = 0; c < 3; ++c) {
       voxel[static_cast<size_t>(c)] = static_cast<std::int64_t>(std::floor(points[i][c] / side));
     }
