@@ -7,6 +7,7 @@
 #include "dtr/base/memory_budget.h"
 #include "dtr/io/file_checks.h"
 #include "dtr/io/image_formats.h"
+#include "dtr/io/plain_png.h"
 #include "dtr/io/whole_images.h"
 
 namespace dtr::io {
@@ -71,7 +72,10 @@ std::unique_ptr<OpenedImage> OpenImage(const fs::path& file, const OpenLimits& l
   ExpectWholeFile(file);
   ExpectWithin(file, LookAtWholeImage(file), limits);
   std::string complaint;
-  auto in = Decoded(file, [&] { return Codecs().Open(file.string(), raw_balance, complaint); });
+  auto in = OpenPlainPng(file);
+  if (!in) {
+    in = Decoded(file, [&] { return Codecs().Open(file.string(), raw_balance, complaint); });
+  }
   if (!in) throw Error(file.string() + ": no readable image: " + OneLine(complaint));
   const ImageFacts& facts = in->facts();
   if (facts.width <= 0 || facts.height <= 0 || facts.channels <= 0 || facts.depth > 1) {
@@ -121,6 +125,9 @@ void ReadPixels(OpenedImage& in, const fs::path& file, int first_channel, int en
 
 std::string EncodeImage(const std::string& extension, const ImageToWrite& image, Sample sample,
                         const void* pixels) {
+  if (extension == ".png") {
+    if (auto bytes = EncodePlainPng(image, sample, pixels)) return *std::move(bytes);
+  }
   std::string complaint;
   auto bytes = Codecs().Encode(extension, image, sample, pixels, complaint);
   if (bytes) return *std::move(bytes);
