@@ -1,5 +1,3 @@
-#include <OpenImageIO/imageio.h>
-
 #include <algorithm>
 #include <array>
 #include <map>
@@ -12,6 +10,7 @@
 #include "capture/ingest.h"
 #include "capture/names.h"
 #include "dtr/base/lower_case.h"
+#include "dtr/io/image_formats.h"
 
 namespace dtr::capture {
 namespace {
@@ -31,7 +30,7 @@ std::set<std::string> ReadableExtensions(const std::string& asked) {
   // Formats of films, volumes and terminals.
   static const std::set<std::string> kNoPhotos{"ffmpeg", "field3d", "null", "openvdb",
                                                "ptex",   "term",    "zfile"};
-  std::istringstream formats(OIIO::get_string_attribute("extension_list"));
+  std::istringstream formats(io::ImageFormatList());
   std::set<std::string> extensions;
   for (std::string format; std::getline(formats, format, ';');) {
     const size_t colon = format.find(':');

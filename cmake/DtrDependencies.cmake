@@ -9,6 +9,7 @@ find_package(OpenCV 4.6 REQUIRED COMPONENTS core imgproc calib3d features2d aruc
 find_package(Ceres 2.1 REQUIRED)
 find_package(OpenImageIO 2.4 REQUIRED)
 find_package(JPEG REQUIRED)
+find_package(PNG REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(nlohmann_json 3.11 REQUIRED)
 find_package(fmt 9 REQUIRED)

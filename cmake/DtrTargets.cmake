@@ -72,6 +72,28 @@ function(dtr_library name)
   install(TARGETS ${name} EXPORT dtrTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)
 endfunction()
 
+# What takes long to load and few commands need is in modules, and a program loads them when it calls them. A program or library
+# without dtr_on_demand links the same static libraries: so do all with sanitizers, whose dlopen knows no run path.
+# dtr_module(NAME LIBRARY SOURCE): NAME.so of a static library of ours and all that it is made of.
+function(dtr_module name library source)
+  add_library(${name} MODULE ${source})
+  set_target_properties(${name} PROPERTIES PREFIX "" CXX_VISIBILITY_PRESET hidden
+    LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/modules)
+  target_link_libraries(${name} PRIVATE ${library})
+  target_link_options(${name} PRIVATE -Wl,--exclude-libs,ALL -Wl,--no-undefined -Wl,--as-needed)
+  dtr_compile_options(${name})
+  install(TARGETS ${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/dtr COMPONENT runtime)
+endfunction()
+
+# dtr_on_demand(TARGET FOLDER MODULE SOURCE): TARGET calls MODULE by SOURCE and does not link its library; where installed, it looks
+# for it in FOLDER.
+function(dtr_on_demand target folder module source)
+  target_sources(${target} PRIVATE ${source})
+  set_target_properties(${target} PROPERTIES DTR_ON_DEMAND ON
+    BUILD_RPATH ${PROJECT_BINARY_DIR}/modules INSTALL_RPATH ${folder})
+  add_dependencies(${target} ${module})
+endfunction()
+
 # Links in a fifth of the time; there are some ninety programs of tests.
 find_program(DTR_GOLD ld.gold)
 

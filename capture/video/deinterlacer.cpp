@@ -4,11 +4,6 @@
 
 #include <stdexcept>
 
-extern "C" {
-#include <libavfilter/buffersink.h>
-#include <libavfilter/buffersrc.h>
-}
-
 namespace dtr::capture {
 namespace {
 

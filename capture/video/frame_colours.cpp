@@ -8,11 +8,6 @@
 #include <memory>
 #include <stdexcept>
 
-extern "C" {
-#include <libavutil/opt.h>
-#include <libavutil/pixdesc.h>
-}
-
 #include "dtr/io/image_io.h"
 
 namespace dtr::capture {

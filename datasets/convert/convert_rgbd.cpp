@@ -1,6 +1,4 @@
 // Sets whose images come with depth of their own kind and unit.
-#include <OpenImageIO/imageio.h>
-
 #include "datasets/convert/converters.h"
 #include "dtr/base/error.h"
 #include "dtr/io/formats/foreign_depth.h"
@@ -19,11 +17,11 @@ constexpr double kMillimetre = 0.001;
 // Red, green, blue and alpha as stored, not multiplied.
 Grid<std::uint8_t> ReadRgba(const fs::path& file) {
   const auto in = io::OpenImage(file);
-  if (in->spec().nchannels != 4 || in->spec().format != OIIO::TypeDesc::UINT8) {
+  if (in->facts().channels != 4 || in->facts().sample != io::Sample::kUint8) {
     throw Error(file.string() + ": expected 8-bit RGBA, found another kind of image");
   }
-  Grid<std::uint8_t> rgba(in->spec().width, in->spec().height, 4);
-  io::ReadPixels(*in, file, 0, 4, OIIO::TypeDesc::UINT8, rgba.data().data());
+  Grid<std::uint8_t> rgba(in->facts().width, in->facts().height, 4);
+  io::ReadPixels(*in, file, 0, 4, io::Sample::kUint8, rgba.data().data());
   return rgba;
 }
 

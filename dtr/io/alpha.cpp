@@ -16,16 +16,16 @@ namespace {
 
 // OpenImageIO's convention is premultiplied alpha, except where a file is marked as straight. These
 // formats have straight alpha and OpenImageIO neither marks nor converts it.
-bool IsPremultiplied(const OIIO::ImageInput& in) {
-  if (in.spec().get_int_attribute("oiio:UnassociatedAlpha", 0) != 0) return false;
+bool IsPremultiplied(const OpenedImage& in) {
+  if (in.facts().Int("oiio:UnassociatedAlpha", 0) != 0) return false;
   static constexpr std::array<std::string_view, 5> kStraight{"bmp", "gif", "ico", "dds",
                                                              "jpeg2000"};
-  return std::find(kStraight.begin(), kStraight.end(), in.format_name()) == kStraight.end();
+  return std::find(kStraight.begin(), kStraight.end(), in.format()) == kStraight.end();
 }
 
 // A lossy coder makes 0.01 of 0 and 0.99 of 1.
-float SlackOf(const OIIO::ImageInput& in) {
-  const std::string_view format = in.format_name();
+float SlackOf(const OpenedImage& in) {
+  const std::string_view format = in.format();
   return format == "heif" || format == "webp" ? 0.03f : 0.0f;
 }
 
@@ -86,18 +86,18 @@ std::array<float, 3> Interpolated(const Level& coarse, int x, int y) {
 
 }  // namespace
 
-int AlphaChannelOf(const OIIO::ImageSpec& spec) {
-  if (spec.alpha_channel < 0) return -1;
-  if (spec.alpha_channel < spec.nchannels) return spec.alpha_channel;
+int AlphaChannelOf(const ImageFacts& facts) {
+  if (facts.alpha_channel < 0) return -1;
+  if (facts.alpha_channel < facts.channels) return facts.alpha_channel;
   // OpenImageIO 2.4 names channel 4 of a GIF's four, from 0.
-  return spec.nchannels == 2 || spec.nchannels == 4 ? spec.nchannels - 1 : -1;
+  return facts.channels == 2 || facts.channels == 4 ? facts.channels - 1 : -1;
 }
 
-Alpha::Alpha(OIIO::ImageInput& in, const std::filesystem::path& file) {
-  const int channel = AlphaChannelOf(in.spec());
+Alpha::Alpha(OpenedImage& in, const std::filesystem::path& file) {
+  const int channel = AlphaChannelOf(in.facts());
   if (channel < 0) return;
-  Grid<float> values(in.spec().width, in.spec().height);
-  ReadPixels(in, file, channel, channel + 1, OIIO::TypeDesc::FLOAT, values.data().data());
+  Grid<float> values(in.facts().width, in.facts().height);
+  ReadPixels(in, file, channel, channel + 1, Sample::kFloat, values.data().data());
   const float slack = SlackOf(in);
   bool opaque = true;
   for (float& value : values.data()) {

@@ -1,18 +1,17 @@
 // dtr/io/alpha.h -- internal to dtr/io: what the alpha channel of a photo means.
 #pragma once
-#include <OpenImageIO/imageio.h>
-
 #include <cstdint>
 #include <filesystem>
 #include <vector>
 
+#include "dtr/io/image_codecs.h"
 #include "dtr/io/image_io.h"
 #include "dtr/types/grid.h"
 
 namespace dtr::io {
 
 /// The index of the alpha channel, -1 for an image without one.
-int AlphaChannelOf(const OIIO::ImageSpec& spec);
+int AlphaChannelOf(const ImageFacts& facts);
 
 /// The alpha of an image, as a coverage from 0 (transparent) to 1 (opaque).
 class Alpha {
@@ -20,7 +19,7 @@ class Alpha {
   /// Of an image without alpha, or opaque throughout.
   Alpha() = default;
   /// Throws Error when the pixels cannot be read or hold NaN.
-  Alpha(OIIO::ImageInput& in, const std::filesystem::path& file);
+  Alpha(OpenedImage& in, const std::filesystem::path& file);
 
   /// Divides premultiplied colours by alpha and makes transparent pixels black, in the values that
   /// the file stores: linear light in float files, coded values in others. Straight colours of

@@ -20,8 +20,6 @@ namespace dtr::io {
 namespace {
 
 namespace fs = std::filesystem;
-using OIIO::ImageSpec;
-using OIIO::TypeDesc;
 
 constexpr float kLargestHalf = 65504;
 
@@ -49,38 +47,38 @@ bool IsDepthOfALayer(const std::string& channel) {
 
 // The channel Z or Y, else the one that a layer calls its depth (Blender: ViewLayer.Depth.Z), else
 // the first of an image that holds nothing else.
-int DepthChannel(const ImageSpec& spec, const fs::path& file) {
+int DepthChannel(const ImageFacts& facts, const fs::path& file) {
+  const std::vector<std::string>& channels = facts.channel_names;
   for (const char* name : {"Z", "Y"}) {
-    const int channel = spec.channelindex(name);
-    if (channel >= 0) return channel;
+    const auto channel = std::find(channels.begin(), channels.end(), name);
+    if (channel != channels.end()) return static_cast<int>(channel - channels.begin());
   }
   std::vector<int> found;
   std::string names;
   bool plain = true;
-  for (int i = 0; i < spec.nchannels; ++i) {
-    const std::string name = spec.channel_name(i);
-    if (IsDepthOfALayer(name)) found.push_back(i);
-    names += (i > 0 ? ", " : "") + name;
+  for (const std::string& name : channels) {
+    if (IsDepthOfALayer(name)) found.push_back(static_cast<int>(&name - channels.data()));
+    names += (&name == channels.data() ? "" : ", ") + name;
     plain = plain && (name == "R" || name == "G" || name == "B" || name == "A");
   }
   if (found.size() == 1) return found.front();
-  if (found.empty() && (plain || spec.nchannels == 1)) return 0;
+  if (found.empty() && (plain || facts.channels == 1)) return 0;
   throw Error(file.string() +
               ": expected one channel of depth, called Z, Y, depth or LAYER.Depth.Z, found " +
               names.substr(0, 200) + "; write the depth into a file of its own");
 }
 
 // Programs that render a part of an image write that part alone.
-void ExpectWholeImage(const ImageSpec& spec, const fs::path& file) {
-  if (spec.x == spec.full_x && spec.y == spec.full_y && spec.width == spec.full_width &&
-      spec.height == spec.full_height) {
+void ExpectWholeImage(const ImageFacts& facts, const fs::path& file) {
+  if (facts.x == facts.full_x && facts.y == facts.full_y && facts.width == facts.full_width &&
+      facts.height == facts.full_height) {
     return;
   }
   throw Error(file.string() + ": expected pixels for the whole image of " +
-              std::to_string(spec.full_width) + "x" + std::to_string(spec.full_height) +
-              ", found " + std::to_string(spec.width) + "x" + std::to_string(spec.height) +
-              " of them from (" + std::to_string(spec.x - spec.full_x) + ", " +
-              std::to_string(spec.y - spec.full_y) + ") on; write it without a border");
+              std::to_string(facts.full_width) + "x" + std::to_string(facts.full_height) +
+              ", found " + std::to_string(facts.width) + "x" + std::to_string(facts.height) +
+              " of them from (" + std::to_string(facts.x - facts.full_x) + ", " +
+              std::to_string(facts.y - facts.full_y) + ") on; write it without a border");
 }
 
 // Errors of the pure coding functions name a pixel; this puts the file in front.
@@ -93,27 +91,27 @@ auto Naming(const fs::path& file, const Function& function) {
   }
 }
 
-Grid<float> ReadFloatsOf(OIIO::ImageInput& in, const fs::path& file) {
-  const ImageSpec& spec = in.spec();
-  if (!spec.format.is_floating_point()) {
-    throw Error(file.string() + ": expected float samples, found " +
-                std::string(spec.format.c_str()) + "; say how its numbers are coded");
+Grid<float> ReadFloatsOf(OpenedImage& in, const fs::path& file) {
+  const ImageFacts& facts = in.facts();
+  if (!IsFloat(facts.sample)) {
+    throw Error(file.string() + ": expected float samples, found " + facts.sample_name +
+                "; say how its numbers are coded");
   }
-  ExpectWholeImage(spec, file);
-  Grid<float> grid(spec.width, spec.height);
-  const int channel = DepthChannel(spec, file);
-  ReadPixels(in, file, channel, channel + 1, TypeDesc::FLOAT, grid.data().data());
+  ExpectWholeImage(facts, file);
+  Grid<float> grid(facts.width, facts.height);
+  const int channel = DepthChannel(facts, file);
+  ReadPixels(in, file, channel, channel + 1, Sample::kFloat, grid.data().data());
   return grid;
 }
 
-Grid<std::uint16_t> ReadCodesOf(OIIO::ImageInput& in, const fs::path& file) {
-  const ImageSpec& spec = in.spec();
-  if (spec.format.basetype != TypeDesc::UINT16 || spec.nchannels != 1) {
+Grid<std::uint16_t> ReadCodesOf(OpenedImage& in, const fs::path& file) {
+  const ImageFacts& facts = in.facts();
+  if (facts.sample != Sample::kUint16 || facts.channels != 1) {
     throw Error(file.string() + ": expected one channel of 16 bits, found " +
-                std::to_string(spec.nchannels) + " of " + std::string(spec.format.c_str()));
+                std::to_string(facts.channels) + " of " + facts.sample_name);
   }
-  Grid<std::uint16_t> grid(spec.width, spec.height);
-  ReadPixels(in, file, 0, 1, TypeDesc::UINT16, grid.data().data());
+  Grid<std::uint16_t> grid(facts.width, facts.height);
+  ReadPixels(in, file, 0, 1, Sample::kUint16, grid.data().data());
   return grid;
 }
 
@@ -203,13 +201,16 @@ Grid<std::uint16_t> ReadCodes(const fs::path& file, int width_px, int height_px,
 constexpr int kSigmaBits = 16;  // the upper ones of float32 hold eight significant bits
 
 void WriteFloats(const fs::path& file, const Grid<float>& grid,
-                 const std::vector<std::string>& channels, TypeDesc type, Mark mark) {
-  ImageSpec spec(grid.width(), grid.height(), grid.channels(), type);
-  spec.channelnames = channels;
-  spec.attribute("compression", "zip");
-  spec.attribute("DateTime", "");  // else OpenImageIO writes the time of day
-  if (mark == Mark::kRendered) spec.attribute("Software", kRenderedSoftware);
-  WriteFileAtomically(file, EncodeImage(".exr", spec, TypeDesc::FLOAT, grid.data().data()));
+                 const std::vector<std::string>& channels, Sample sample, Mark mark) {
+  ImageToWrite image{
+      grid.width(),
+      grid.height(),
+      grid.channels(),
+      sample,
+      {{"compression", "zip"}, {"DateTime", ""}},  // else OpenImageIO writes the time of day
+      channels};
+  if (mark == Mark::kRendered) image.attributes.emplace_back("Software", kRenderedSoftware);
+  WriteFileAtomically(file, EncodeImage(".exr", image, Sample::kFloat, grid.data().data()));
 }
 
 }  // namespace
@@ -230,14 +231,14 @@ void WriteExr(const fs::path& file, const Grid<float>& grid, bool half, Mark mar
       }
     }
   }
-  WriteFloats(file, grid, {"Y"}, half ? TypeDesc::HALF : TypeDesc::FLOAT, mark);
+  WriteFloats(file, grid, {"Y"}, half ? Sample::kHalf : Sample::kFloat, mark);
 }
 
 void WriteExrOfVectors(const fs::path& file, const Grid<float>& grid, Mark mark) {
   if (grid.empty() || grid.channels() != 3) {
     throw Error(file.string() + ": expected three channels of floats to write");
   }
-  WriteFloats(file, grid, {"X", "Y", "Z"}, TypeDesc::FLOAT, mark);
+  WriteFloats(file, grid, {"X", "Y", "Z"}, Sample::kFloat, mark);
 }
 
 Grid<std::uint16_t> ReadPng16(const fs::path& file, std::uint64_t limit_px) {
@@ -248,8 +249,8 @@ void WritePng16(const fs::path& file, const Grid<std::uint16_t>& grid) {
   if (grid.empty() || grid.channels() != 1) {
     throw Error(file.string() + ": expected one channel of 16 bits to write");
   }
-  const ImageSpec spec(grid.width(), grid.height(), 1, TypeDesc::UINT16);
-  WriteFileAtomically(file, EncodeImage(".png", spec, TypeDesc::UINT16, grid.data().data()));
+  const ImageToWrite image{grid.width(), grid.height(), 1, Sample::kUint16};
+  WriteFileAtomically(file, EncodeImage(".png", image, Sample::kUint16, grid.data().data()));
 }
 
 void WriteDepth(const fs::path& file, const DepthImage& depth, const DepthFormat& format) {

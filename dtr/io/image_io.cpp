@@ -1,7 +1,5 @@
 #include "dtr/io/image_io.h"
 
-#include <OpenImageIO/tiffutils.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -25,93 +23,81 @@ namespace dtr::io {
 namespace {
 
 namespace fs = std::filesystem;
-using OIIO::ImageSpec;
-using OIIO::TypeDesc;
 
-bool IsFloat(const TypeDesc& type) {
-  return type.basetype == TypeDesc::HALF || type.basetype == TypeDesc::FLOAT ||
-         type.basetype == TypeDesc::DOUBLE;
-}
-
-std::optional<double> PositiveNumber(const ImageSpec& spec, const char* name) {
-  const float value = spec.get_float_attribute(name, 0);
+std::optional<double> PositiveNumber(const ImageFacts& facts, const char* name) {
+  const float value = facts.Float(name, 0);
   if (!std::isfinite(value) || value <= 0) return std::nullopt;
   return value;
 }
 
 // Degrees from EXIF's three rationals (degrees, minutes, seconds); south and west are negative.
-std::optional<double> GpsAngle(const ImageSpec& spec, const char* name, const char* ref_name,
+std::optional<double> GpsAngle(const ImageFacts& facts, const char* name, const char* ref_name,
                                char negative) {
-  const OIIO::ParamValue* value = spec.find_attribute(name);
-  if (value == nullptr || value->type().basevalues() < 3) return std::nullopt;
-  const double angle_deg = value->get_float_indexed(0) + value->get_float_indexed(1) / 60.0 +
-                           value->get_float_indexed(2) / 3600.0;
+  const std::vector<float> parts = facts.Floats(name);
+  if (parts.size() < 3) return std::nullopt;
+  const double angle_deg = parts[0] + parts[1] / 60.0 + parts[2] / 3600.0;
   if (!std::isfinite(angle_deg) || angle_deg < 0 || angle_deg > 180) return std::nullopt;
-  const std::string ref(spec.get_string_attribute(ref_name));
+  const std::string ref = facts.Text(ref_name);
   return !ref.empty() && ref[0] == negative ? -angle_deg : angle_deg;
 }
 
-std::optional<GpsPosition> GpsOf(const ImageSpec& spec) {
-  const auto latitude = GpsAngle(spec, "GPS:Latitude", "GPS:LatitudeRef", 'S');
-  const auto longitude = GpsAngle(spec, "GPS:Longitude", "GPS:LongitudeRef", 'W');
+std::optional<GpsPosition> GpsOf(const ImageFacts& facts) {
+  const auto latitude = GpsAngle(facts, "GPS:Latitude", "GPS:LatitudeRef", 'S');
+  const auto longitude = GpsAngle(facts, "GPS:Longitude", "GPS:LongitudeRef", 'W');
   if (!latitude || !longitude || std::abs(*latitude) > 90) return std::nullopt;
   GpsPosition gps{*latitude, *longitude, std::nullopt, std::nullopt};
-  if (spec.find_attribute("GPS:Altitude") != nullptr) {
-    const double altitude_m = spec.get_float_attribute("GPS:Altitude", NAN);
-    const bool below = spec.get_int_attribute("GPS:AltitudeRef", 0) == 1;
-    if (std::isfinite(altitude_m)) gps.altitude_m = below ? -altitude_m : altitude_m;
-  }
-  gps.horizontal_error_m = PositiveNumber(spec, "GPS:HPositioningError");
+  const double altitude_m = facts.Float("GPS:Altitude", NAN);
+  const bool below = facts.Int("GPS:AltitudeRef", 0) == 1;
+  if (std::isfinite(altitude_m)) gps.altitude_m = below ? -altitude_m : altitude_m;
+  gps.horizontal_error_m = PositiveNumber(facts, "GPS:HPositioningError");
   return gps;
 }
 
 // EXIF tag 0xA20E counts pixels per unit 0xA210: 2 = inch, 3 = centimetre.
-std::optional<double> FocalPlanePxPerMm(const ImageSpec& spec) {
-  const auto resolution = PositiveNumber(spec, "Exif:FocalPlaneXResolution");
+std::optional<double> FocalPlanePxPerMm(const ImageFacts& facts) {
+  const auto resolution = PositiveNumber(facts, "Exif:FocalPlaneXResolution");
   if (!resolution) return std::nullopt;
-  const int unit = spec.get_int_attribute("Exif:FocalPlaneResolutionUnit", 2);
+  const int unit = facts.Int("Exif:FocalPlaneResolutionUnit", 2);
   if (unit == 2) return *resolution / 25.4;
   if (unit == 3) return *resolution / 10.0;
   return std::nullopt;
 }
 
 // LibRaw's multipliers, relative to green.
-std::optional<RawBalance> RawBalanceOf(const ImageSpec& spec) {
-  const OIIO::ParamValue* value = spec.find_attribute("raw:cam_mul");
-  if (value == nullptr || value->type().basevalues() < 3) return std::nullopt;
+std::optional<RawBalance> RawBalanceOf(const ImageFacts& facts) {
+  const std::vector<float> factors = facts.Floats("raw:cam_mul");
+  if (factors.size() < 3) return std::nullopt;
   RawBalance balance{};
-  const double green = value->get_float_indexed(1);
-  for (int c = 0; c < 3; ++c) {
-    balance[static_cast<size_t>(c)] = value->get_float_indexed(c) / green;
-    if (!(balance[static_cast<size_t>(c)] > 0) || !std::isfinite(balance[static_cast<size_t>(c)])) {
-      return std::nullopt;
-    }
+  const double green = factors[1];
+  for (size_t c = 0; c < 3; ++c) {
+    balance[c] = factors[c] / green;
+    if (!(balance[c] > 0) || !std::isfinite(balance[c])) return std::nullopt;
   }
   return balance;
 }
 
-int ExifOrientationOf(const ImageSpec& spec) {
-  const int orientation = spec.get_int_attribute("Orientation", 1);
+int ExifOrientationOf(const ImageFacts& facts) {
+  const int orientation = facts.Int("Orientation", 1);
   return orientation >= 1 && orientation <= 8 ? orientation : 1;
 }
 
 // Channels to read: RGB of colour images, the one channel of grey ones; alpha and more are left.
-int ColourChannels(const ImageSpec& spec) { return spec.nchannels >= 3 ? 3 : 1; }
+int ColourChannels(const ImageFacts& facts) { return facts.channels >= 3 ? 3 : 1; }
 
 // Pixels as 8-bit sRGB with the file's number of colour channels, without what alpha hides.
-Grid<std::uint8_t> ReadColours(OIIO::ImageInput& in, const fs::path& file,
-                               const PhotoColours& colours, const Alpha& alpha) {
-  const ImageSpec& spec = in.spec();
-  const int channels = ColourChannels(spec);
-  Grid<std::uint8_t> pixels(spec.width, spec.height, channels);
-  if (spec.format.basetype == TypeDesc::UINT8 && !colours.converts()) {
-    ReadPixels(in, file, 0, channels, TypeDesc::UINT8, pixels.data().data());
+Grid<std::uint8_t> ReadColours(OpenedImage& in, const fs::path& file, const PhotoColours& colours,
+                               const Alpha& alpha) {
+  const ImageFacts& facts = in.facts();
+  const int channels = ColourChannels(facts);
+  Grid<std::uint8_t> pixels(facts.width, facts.height, channels);
+  if (facts.sample == Sample::kUint8 && !colours.converts()) {
+    ReadPixels(in, file, 0, channels, Sample::kUint8, pixels.data().data());
     alpha.Straighten(pixels.data(), channels);
     return pixels;
   }
-  const bool linear = IsFloat(spec.format);
+  const bool linear = IsFloat(facts.sample);
   std::vector<float> values(pixels.data().size());
-  ReadPixels(in, file, 0, channels, TypeDesc::FLOAT, values.data());
+  ReadPixels(in, file, 0, channels, Sample::kFloat, values.data());
   if (!std::all_of(values.begin(), values.end(),
                    [](float value) { return std::isfinite(value); })) {
     throw Error(file.string() + ": expected finite colours, found NaN or infinity");
@@ -129,15 +115,15 @@ Grid<std::uint8_t> ReadColours(OIIO::ImageInput& in, const fs::path& file,
   return pixels;
 }
 
-bool IsOrdinaryJpeg(const OIIO::ImageInput& in) {
-  const int channels = in.spec().nchannels;
-  return std::string(in.format_name()) == "jpeg" && (channels == 1 || channels == 3);
+bool IsOrdinaryJpeg(const OpenedImage& in) {
+  const int channels = in.facts().channels;
+  return in.format() == "jpeg" && (channels == 1 || channels == 3);
 }
 
 // The same of a JPEG. `in` is closed, so that no image is held twice.
-Grid<std::uint8_t> ReadJpegColours(OIIO::ImageInput& in, const fs::path& file,
+Grid<std::uint8_t> ReadJpegColours(OpenedImage& in, const fs::path& file,
                                    const PhotoColours& colours) {
-  in.close();
+  in.Close();
   Grid<std::uint8_t> pixels = ReadJpegPixels(file);
   if (!colours.converts()) return pixels;
   std::vector<float> values(pixels.data().size());
@@ -162,58 +148,51 @@ void ExpectRgb(const fs::path& file, const ImageRgb8& image) {
   }
 }
 
-ImageSpec Spec8(int width, int height, int channels, Mark mark) {
-  ImageSpec spec(width, height, channels, TypeDesc::UINT8);
-  if (mark == Mark::kRendered) spec.attribute("Software", kRenderedSoftware);
-  return spec;
+ImageToWrite Image8(int width, int height, int channels, Mark mark) {
+  ImageToWrite image{width, height, channels};
+  if (mark == Mark::kRendered) image.attributes.emplace_back("Software", kRenderedSoftware);
+  return image;
 }
 
-ImageSpec Rgb8Spec(const ImageRgb8& image, Mark mark = Mark::kNone) {
-  return Spec8(image.width(), image.height(), 3, mark);
+ImageToWrite Rgb8(const ImageRgb8& image, Mark mark = Mark::kNone) {
+  return Image8(image.width(), image.height(), 3, mark);
 }
 
-std::string EncodeJpeg(const ImageRgb8& image, int quality, ImageSpec spec) {
-  spec.attribute("CompressionQuality", std::clamp(quality, 1, 100));
-  spec.attribute("jpeg:subsampling", "4:4:4");
-  return EncodeImage(".jpg", spec, TypeDesc::UINT8, image.data().data());
+std::string EncodeJpeg(const ImageRgb8& image, int quality, ImageToWrite photo) {
+  photo.attributes.emplace_back("CompressionQuality", std::clamp(quality, 1, 100));
+  photo.attributes.emplace_back("jpeg:subsampling", "4:4:4");
+  return EncodeImage(".jpg", photo, Sample::kUint8, image.data().data());
 }
 
-bool IsCmyk(const ImageSpec& spec) {
-  return spec.get_string_attribute("jpeg:ColorSpace") == "CMYK";
-}
+bool IsCmyk(const ImageFacts& facts) { return facts.Text("jpeg:ColorSpace") == "CMYK"; }
 
-// The opened image's spec, with EXIF that OpenImageIO left in the file.
-ImageSpec SpecOf(const OIIO::ImageInput& in, const fs::path& file) {
-  ImageSpec spec = in.spec();
+// With EXIF that OpenImageIO left in the file. HEIF turns images by properties of its own, which
+// the decoder applies (ISO 23008-12, 6.5.10).
+std::unique_ptr<ImageFacts> FactsWithExif(const OpenedImage& in, const fs::path& file) {
   const bool is_heif = IsHeif(file);
-  const std::string exif = is_heif ? ReadHeifExif(file) : ReadWebpExif(file);
-  if (!exif.empty()) OIIO::decode_exif(OIIO::string_view(exif), spec);
-  // HEIF turns images by properties of its own, which the decoder applies (ISO 23008-12, 6.5.10).
-  if (is_heif) spec.attribute("Orientation", 1);
-  return spec;
+  return in.FactsWith(is_heif ? ReadHeifExif(file) : ReadWebpExif(file), is_heif);
 }
 
 // What a file holds beside the image that is read.
-void AddRemarks(OIIO::ImageInput& in, ImageHeader& header) {
-  const ImageSpec& spec = in.spec();
-  const int used = ColourChannels(spec) + (spec.alpha_channel >= 0 ? 1 : 0);
-  if (spec.nchannels > used && !IsCmyk(spec)) {
-    header.remarks.push_back("of its " + std::to_string(spec.nchannels) +
+void AddRemarks(OpenedImage& in, ImageHeader& header) {
+  const ImageFacts& facts = in.facts();
+  const int used = ColourChannels(facts) + (facts.alpha_channel >= 0 ? 1 : 0);
+  if (facts.channels > used && !IsCmyk(facts)) {
+    header.remarks.push_back("of its " + std::to_string(facts.channels) +
                              " channels only the colours are used");
   }
   // The layers of a PSD are in its first image.
-  if (header.format != "psd" && in.seek_subimage(1, 0)) {
+  if (header.format != "psd" && in.HasSecondImage()) {
     header.remarks.push_back("holds more than one image; the first is used");
   }
-  (void)in.geterror();
 }
 
 // At the peak of ReadImageAndMask, in its three parts: reading, masking, rotating.
-double ReadBytesOf(const OIIO::ImageInput& in, const fs::path& file, bool converts) {
-  const ImageSpec& spec = in.spec();
-  const bool has_alpha = AlphaChannelOf(spec) >= 0;
-  const double colours = ColourChannels(spec), alpha = has_alpha ? sizeof(float) : 0;
-  const bool as_floats = converts || spec.format.basetype != TypeDesc::UINT8;
+double ReadBytesOf(const OpenedImage& in, const fs::path& file, bool converts) {
+  const ImageFacts& facts = in.facts();
+  const bool has_alpha = AlphaChannelOf(facts) >= 0;
+  const double colours = ColourChannels(facts), alpha = has_alpha ? sizeof(float) : 0;
+  const bool as_floats = converts || facts.sample != Sample::kUint8;
   constexpr double kRgb = 3, kMask = 1;
   constexpr double kCoarser = (3 * sizeof(float) + 1) / 3.0;  // FillUnusable: all halvings
   const double reading = colours * (as_floats ? 1 + sizeof(float) : 1) + alpha;
@@ -221,7 +200,7 @@ double ReadBytesOf(const OIIO::ImageInput& in, const fs::path& file, bool conver
       kRgb + (colours < kRgb ? colours : 0) + (has_alpha ? alpha + kMask + kCoarser : 0);
   const double rotating = 2 * kRgb + (has_alpha ? alpha + 2 * kMask : 0);
   const double bytes_per_px = std::max({reading, masking, rotating});
-  return DecoderBytes(in, file) + bytes_per_px * spec.width * spec.height;
+  return DecoderBytes(in, file) + bytes_per_px * facts.width * facts.height;
 }
 
 }  // namespace
@@ -233,29 +212,29 @@ double BytesToReadHeader(const fs::path& file) {
 
 ImageHeader ReadImageHeader(const fs::path& file, double memory_gb) {
   const auto in = OpenImage(file, {UINT64_MAX, memory_gb});
-  const ImageSpec spec = SpecOf(*in, file);
+  const auto stated = FactsWithExif(*in, file);
+  const ImageFacts& facts = *stated;
   ImageHeader header;
-  header.width_px = spec.width;
-  header.height_px = spec.height;
+  header.width_px = facts.width;
+  header.height_px = facts.height;
   // OpenImageIO tells the channels that it will convert a CMYK JPEG to, not those of the file.
-  header.channels = IsCmyk(spec) ? 4 : spec.nchannels;
-  header.has_alpha = AlphaChannelOf(spec) >= 0;
-  header.bits =
-      spec.get_int_attribute("oiio:BitsPerSample", static_cast<int>(spec.format.size() * 8));
-  header.is_float = IsFloat(spec.format);
-  header.format = in->format_name();
-  header.exif_orientation = ExifOrientationOf(spec);
-  header.focal_mm = PositiveNumber(spec, "Exif:FocalLength");
-  header.focal_35mm = PositiveNumber(spec, "Exif:FocalLengthIn35mmFilm");
-  header.focal_plane_px_per_mm = FocalPlanePxPerMm(spec);
-  header.make = spec.get_string_attribute("Make");
-  header.model = spec.get_string_attribute("Model");
-  header.lens_model = spec.get_string_attribute("Exif:LensModel");
-  header.date_time = spec.get_string_attribute("Exif:DateTimeOriginal");
-  header.gps = GpsOf(spec);
+  header.channels = IsCmyk(facts) ? 4 : facts.channels;
+  header.has_alpha = AlphaChannelOf(facts) >= 0;
+  header.bits = facts.Int("oiio:BitsPerSample", static_cast<int>(facts.sample_bytes * 8));
+  header.is_float = IsFloat(facts.sample);
+  header.format = in->format();
+  header.exif_orientation = ExifOrientationOf(facts);
+  header.focal_mm = PositiveNumber(facts, "Exif:FocalLength");
+  header.focal_35mm = PositiveNumber(facts, "Exif:FocalLengthIn35mmFilm");
+  header.focal_plane_px_per_mm = FocalPlanePxPerMm(facts);
+  header.make = facts.Text("Make");
+  header.model = facts.Text("Model");
+  header.lens_model = facts.Text("Exif:LensModel");
+  header.date_time = facts.Text("Exif:DateTimeOriginal");
+  header.gps = GpsOf(facts);
   header.panorama = ReadPanoramaXmp(file);
-  header.raw_balance = RawBalanceOf(spec);
-  const PhotoColours colours(spec, in->format_name(), file);
+  header.raw_balance = RawBalanceOf(facts);
+  const PhotoColours colours(facts, in->format(), file);
   header.converted = colours.converts();
   header.read_bytes = ReadBytesOf(*in, file, colours.converts());
   header.remarks = colours.remarks();
@@ -269,10 +248,11 @@ ImageRgb8 ReadImage(const fs::path& file, const ImageReadOptions& options) {
 
 ImageAndMask ReadImageAndMask(const fs::path& file, const ImageReadOptions& options) {
   const auto in = OpenImage(file, {options.limit_px, options.memory_gb}, options.raw_balance);
-  const PhotoColours colours(in->spec(), in->format_name(), file);
+  const PhotoColours colours(in->facts(), in->format(), file);
   ExpectMemory(*in, file, ReadBytesOf(*in, file, colours.converts()), options.memory_gb);
   const Alpha alpha(*in, file);
-  const int orientation = options.apply_exif_orientation ? ExifOrientationOf(SpecOf(*in, file)) : 1;
+  const int orientation =
+      options.apply_exif_orientation ? ExifOrientationOf(*FactsWithExif(*in, file)) : 1;
   Grid<std::uint8_t> pixels = IsOrdinaryJpeg(*in) ? ReadJpegColours(*in, file, colours)
                                                   : ReadColours(*in, file, colours, alpha);
   if (pixels.channels() == 1) pixels = RgbFromGrey(pixels);
@@ -288,9 +268,9 @@ ImageAndMask ReadImageAndMask(const fs::path& file, const ImageReadOptions& opti
 Mask ReadMask(const fs::path& file, std::uint64_t limit_px, double memory_gb) {
   const auto in = OpenImage(file, {limit_px, memory_gb});
   ExpectMemory(*in, file, ReadBytesOf(*in, file, false), memory_gb);
-  Mask mask(in->spec().width, in->spec().height);
+  Mask mask(in->facts().width, in->facts().height);
   if (IsOrdinaryJpeg(*in)) {
-    in->close();
+    in->Close();
     const Grid<std::uint8_t> pixels = ReadJpegPixels(file);
     ExpectSize(*in, file, pixels.width(), pixels.height());
     const auto channels = static_cast<size_t>(pixels.channels());
@@ -298,9 +278,9 @@ Mask ReadMask(const fs::path& file, std::uint64_t limit_px, double memory_gb) {
     for (std::uint8_t& value : mask.data()) value = value >= 128 ? 255 : 0;
     return mask;
   }
-  ReadPixels(*in, file, 0, 1, TypeDesc::UINT8, mask.data().data());
+  ReadPixels(*in, file, 0, 1, Sample::kUint8, mask.data().data());
   for (std::uint8_t& value : mask.data()) value = value >= 128 ? 255 : 0;
-  if (AlphaChannelOf(in->spec()) > 0) {
+  if (AlphaChannelOf(in->facts()) > 0) {
     const Mask opaque = Alpha(*in, file).Usable();
     for (size_t i = 0; i < opaque.data().size(); ++i) mask.data()[i] &= opaque.data()[i];
   }
@@ -313,7 +293,7 @@ void WriteImage(const fs::path& file, const ImageRgb8& image, int jpeg_quality, 
   if (extension == ".png") {
     WriteFileAtomically(file, EncodePng(image, mark));
   } else if (extension == ".jpg" || extension == ".jpeg") {
-    WriteFileAtomically(file, EncodeJpeg(image, jpeg_quality, Rgb8Spec(image, mark)));
+    WriteFileAtomically(file, EncodeJpeg(image, jpeg_quality, Rgb8(image, mark)));
   } else {
     throw UsageError(file.string() + ": expected a name ending in .png or .jpg, found '" +
                      extension + "'");
@@ -322,7 +302,7 @@ void WriteImage(const fs::path& file, const ImageRgb8& image, int jpeg_quality, 
 
 std::string EncodePng(const ImageRgb8& image, Mark mark) {
   ExpectRgb("PNG", image);
-  return EncodeImage(".png", Rgb8Spec(image, mark), TypeDesc::UINT8, image.data().data());
+  return EncodeImage(".png", Rgb8(image, mark), Sample::kUint8, image.data().data());
 }
 
 void WritePng(const fs::path& file, const ImageRgb8& image) {
@@ -345,30 +325,34 @@ void WriteImageWithAlpha(const fs::path& file, const ImageRgb8& image, const Mas
     for (size_t c = 0; c < 3; ++c) rgba.data()[4 * i + c] = image.data()[3 * i + c];
     rgba.data()[4 * i + 3] = alpha.data()[i];
   }
-  ImageSpec spec = Spec8(image.width(), image.height(), 4, mark);
-  spec.attribute("oiio:UnassociatedAlpha", 1);
-  WriteFileAtomically(file, EncodeImage(".png", spec, TypeDesc::UINT8, rgba.data().data()));
+  ImageToWrite written = Image8(image.width(), image.height(), 4, mark);
+  written.attributes.emplace_back("oiio:UnassociatedAlpha", 1);
+  WriteFileAtomically(file, EncodeImage(".png", written, Sample::kUint8, rgba.data().data()));
 }
 
 void WriteMask(const fs::path& file, const Mask& mask, Mark mark) {
   if (mask.empty() || mask.channels() != 1) {
     throw Error(file.string() + ": expected a mask of 1 channel to write");
   }
-  const ImageSpec spec = Spec8(mask.width(), mask.height(), 1, mark);
-  WriteFileAtomically(file, EncodeImage(".png", spec, TypeDesc::UINT8, mask.data().data()));
+  const ImageToWrite image = Image8(mask.width(), mask.height(), 1, mark);
+  WriteFileAtomically(file, EncodeImage(".png", image, Sample::kUint8, mask.data().data()));
 }
 
 void WriteJpegWithExif(const fs::path& file, const ImageRgb8& image, int quality,
                        const ExifFocal& exif) {
   ExpectRgb(file, image);
-  ImageSpec spec = Rgb8Spec(image);
-  if (!exif.make.empty()) spec.attribute("Make", exif.make);
-  if (!exif.model.empty()) spec.attribute("Model", exif.model);
-  if (exif.focal_mm) spec.attribute("Exif:FocalLength", static_cast<float>(*exif.focal_mm));
-  if (exif.focal_35mm) {
-    spec.attribute("Exif:FocalLengthIn35mmFilm", static_cast<int>(std::lround(*exif.focal_35mm)));
+  ImageToWrite photo = Rgb8(image);
+  auto& attributes = photo.attributes;
+  if (!exif.make.empty()) attributes.emplace_back("Make", exif.make);
+  if (!exif.model.empty()) attributes.emplace_back("Model", exif.model);
+  if (exif.focal_mm) {
+    attributes.emplace_back("Exif:FocalLength", static_cast<float>(*exif.focal_mm));
   }
-  WriteFileAtomically(file, EncodeJpeg(image, quality, spec));
+  if (exif.focal_35mm) {
+    attributes.emplace_back("Exif:FocalLengthIn35mmFilm",
+                            static_cast<int>(std::lround(*exif.focal_35mm)));
+  }
+  WriteFileAtomically(file, EncodeJpeg(image, quality, std::move(photo)));
 }
 
 int InverseExifOrientation(int exif_orientation) {

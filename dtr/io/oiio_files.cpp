@@ -1,17 +1,13 @@
 #include "dtr/io/oiio_files.h"
 
-#include <OpenImageIO/filesystem.h>
-
 #include <algorithm>
-#include <array>
-#include <mutex>
 #include <stdexcept>
-#include <system_error>
-#include <vector>
 
 #include "dtr/base/error.h"
 #include "dtr/base/memory_budget.h"
 #include "dtr/io/file_checks.h"
+#include "dtr/io/image_formats.h"
+#include "dtr/io/plain_png.h"
 #include "dtr/io/whole_images.h"
 
 namespace dtr::io {
@@ -28,36 +24,6 @@ std::string OneLine(std::string text) {
   }
   while (!text.empty() && (text.back() == ' ' || text.back() == '.')) text.pop_back();
   return text;
-}
-
-// Our loops run over files, so OpenImageIO's own threads would only compete with them.
-void SetUpOnce() {
-  static std::once_flag once;
-  std::call_once(once, [] {
-    OIIO::attribute("exr_threads", -1);
-    try {
-      OIIO::attribute("threads", 1);
-    } catch (const std::system_error&) {
-      // It starts a thread that it does not use, and the system may have none left.
-    }
-  });
-}
-
-// What OpenImageIO is asked for.
-OIIO::ImageSpec WishesFor(const std::optional<RawBalance>& raw_balance) {
-  OIIO::ImageSpec wishes;  // raw colours: alpha is dropped, not multiplied in
-  wishes.attribute("oiio:UnassociatedAlpha", 1);
-  // Of raw files: brightness as exposed, for neighbouring photos must show one surface alike.
-  wishes.attribute("raw:auto_bright", 0);
-  wishes.attribute("raw:adjust_maximum_thr", 0.0f);
-  if (raw_balance) {
-    const std::array<float, 4> factors{
-        static_cast<float>((*raw_balance)[0]), static_cast<float>((*raw_balance)[1]),
-        static_cast<float>((*raw_balance)[2]), static_cast<float>((*raw_balance)[1])};
-    wishes.attribute("raw:use_camera_wb", 0);
-    wishes.attribute("raw:user_mul", OIIO::TypeDesc(OIIO::TypeDesc::FLOAT, 4), factors.data());
-  }
-  return wishes;
 }
 
 // Decoders compute sizes in 32 bits, and containers of such sizes are a fault of the file.
@@ -93,14 +59,10 @@ void ExpectWithin(const fs::path& file, const std::optional<WholeImage>& image,
   ExpectMemoryFor(file, image->width_px, image->height_px, image->bytes(), limits.memory_gb);
 }
 
-// Photos come out 7 % larger than at zlib's own level 6, in a third of the time (docs/FORMAT.md).
-constexpr int kPngLevel = 2;
-
 }  // namespace
 
-std::unique_ptr<OIIO::ImageInput> OpenImage(const fs::path& file, const OpenLimits& limits,
-                                            const std::optional<RawBalance>& raw_balance) {
-  SetUpOnce();
+std::unique_ptr<OpenedImage> OpenImage(const fs::path& file, const OpenLimits& limits,
+                                       const std::optional<RawBalance>& raw_balance) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) {
     throw Error(file.string() + ": expected an image file, found " +
@@ -109,78 +71,76 @@ std::unique_ptr<OIIO::ImageInput> OpenImage(const fs::path& file, const OpenLimi
   ExpectImageKind(file);
   ExpectWholeFile(file);
   ExpectWithin(file, LookAtWholeImage(file), limits);
-  OIIO::ImageSpec wishes = WishesFor(raw_balance);
-  auto in = Decoded(file, [&] { return OIIO::ImageInput::open(file.string(), &wishes); });
-  if (!in) throw Error(file.string() + ": no readable image: " + OneLine(OIIO::geterror()));
-  const OIIO::ImageSpec& spec = in->spec();
-  if (spec.width <= 0 || spec.height <= 0 || spec.nchannels <= 0 || spec.depth > 1) {
-    throw Error(file.string() + ": expected a flat image, found " + std::to_string(spec.width) +
-                "x" + std::to_string(spec.height) + "x" + std::to_string(spec.depth) + " with " +
-                std::to_string(spec.nchannels) + " channels");
+  std::string complaint;
+  auto in = OpenPlainPng(file);
+  if (!in) {
+    in = Decoded(file, [&] { return Codecs().Open(file.string(), raw_balance, complaint); });
   }
-  const auto width = static_cast<std::uint64_t>(spec.width);
-  const auto height = static_cast<std::uint64_t>(spec.height);
+  if (!in) throw Error(file.string() + ": no readable image: " + OneLine(complaint));
+  const ImageFacts& facts = in->facts();
+  if (facts.width <= 0 || facts.height <= 0 || facts.channels <= 0 || facts.depth > 1) {
+    throw Error(file.string() + ": expected a flat image, found " + std::to_string(facts.width) +
+                "x" + std::to_string(facts.height) + "x" + std::to_string(facts.depth) + " with " +
+                std::to_string(facts.channels) + " channels");
+  }
+  const auto width = static_cast<std::uint64_t>(facts.width);
+  const auto height = static_cast<std::uint64_t>(facts.height);
   ExpectAtMost(file, width, height, limits.px);
-  ExpectPlausibleSize(file, width, height, in->format_name());
-  if (spec.tile_width > 0 && spec.tile_height > 0) {
-    ExpectPlausibleSize(file, static_cast<std::uint64_t>(spec.tile_width),
-                        static_cast<std::uint64_t>(spec.tile_height), in->format_name());
+  ExpectPlausibleSize(file, width, height, in->format());
+  if (facts.tile_width > 0 && facts.tile_height > 0) {
+    ExpectPlausibleSize(file, static_cast<std::uint64_t>(facts.tile_width),
+                        static_cast<std::uint64_t>(facts.tile_height), in->format());
   }
   return in;
 }
 
-double DecoderBytes(const OIIO::ImageInput& in, const fs::path& file) {
+double DecoderBytes(const OpenedImage& in, const fs::path& file) {
   if (const auto whole = LookAtWholeImage(file)) return whole->bytes();
-  const OIIO::ImageSpec& spec = in.spec();
-  const std::string format = in.format_name();
+  const ImageFacts& facts = in.facts();
+  const std::string format = in.format();
   // LibRaw: the sensor's numbers, four channels of 16 bits, and what it makes of them.
   constexpr double kRawBytes = 24;
   const double bytes_per_px = format == "raw"    ? kRawBytes
                               : format == "jpeg" ? 0
-                                                 : static_cast<double>(spec.pixel_bytes(true));
-  const double pixels = static_cast<double>(spec.width) * spec.height;
+                                                 : static_cast<double>(facts.pixel_bytes);
+  const double pixels = static_cast<double>(facts.width) * facts.height;
   // A tile may be larger than its image.
-  return bytes_per_px * std::max(pixels, static_cast<double>(spec.tile_width) * spec.tile_height);
+  return bytes_per_px * std::max(pixels, static_cast<double>(facts.tile_width) * facts.tile_height);
 }
 
-void ExpectMemory(const OIIO::ImageInput& in, const fs::path& file, double bytes,
-                  double memory_gb) {
-  ExpectMemoryFor(file, static_cast<std::uint64_t>(in.spec().width),
-                  static_cast<std::uint64_t>(in.spec().height), bytes, memory_gb);
+void ExpectMemory(const OpenedImage& in, const fs::path& file, double bytes, double memory_gb) {
+  ExpectMemoryFor(file, static_cast<std::uint64_t>(in.facts().width),
+                  static_cast<std::uint64_t>(in.facts().height), bytes, memory_gb);
 }
 
-void ReadPixels(OIIO::ImageInput& in, const fs::path& file, int first_channel, int end_channel,
-                OIIO::TypeDesc type, void* pixels) {
+void ReadPixels(OpenedImage& in, const fs::path& file, int first_channel, int end_channel,
+                Sample sample, void* pixels) {
+  std::string complaint;
   const bool read =
-      Decoded(file, [&] { return in.read_image(0, 0, first_channel, end_channel, type, pixels); });
-  const std::string complaint = in.geterror();
+      Decoded(file, [&] { return in.Read(first_channel, end_channel, sample, pixels, complaint); });
   if (!read || !complaint.empty()) {
     throw Error(file.string() + ": damaged image: " + OneLine(complaint));
   }
 }
 
-std::string EncodeImage(const std::string& extension, const OIIO::ImageSpec& spec,
-                        OIIO::TypeDesc type, const void* pixels) {
-  SetUpOnce();
-  const std::string name = "memory" + extension;
-  auto out = OIIO::ImageOutput::create(name);
-  OIIO::ImageSpec with_quality = spec;
-  with_quality.attribute("png:compressionLevel", kPngLevel);
-  std::vector<unsigned char> bytes;
-  OIIO::Filesystem::IOVecOutput memory(bytes);
-  if (!out || !out->set_ioproxy(&memory) || !out->open(name, with_quality) ||
-      !out->write_image(type, pixels) || !out->close()) {
-    throw Error("image cannot be encoded as " + extension + ": " +
-                OneLine(out ? out->geterror() : OIIO::geterror()));
+std::string EncodeImage(const std::string& extension, const ImageToWrite& image, Sample sample,
+                        const void* pixels) {
+  if (extension == ".png") {
+    if (auto bytes = EncodePlainPng(image, sample, pixels)) return *std::move(bytes);
   }
-  return {bytes.begin(), bytes.end()};
+  std::string complaint;
+  auto bytes = Codecs().Encode(extension, image, sample, pixels, complaint);
+  if (bytes) return *std::move(bytes);
+  throw Error("image cannot be encoded as " + extension + ": " + OneLine(complaint));
 }
 
-void ExpectSize(const OIIO::ImageInput& in, const fs::path& file, int width_px, int height_px) {
-  if (in.spec().width == width_px && in.spec().height == height_px) return;
+std::string ImageFormatList() { return Codecs().FormatList(); }
+
+void ExpectSize(const OpenedImage& in, const fs::path& file, int width_px, int height_px) {
+  if (in.facts().width == width_px && in.facts().height == height_px) return;
   throw Error(file.string() + ": expected " + std::to_string(width_px) + "x" +
-              std::to_string(height_px) + " pixels, found " + std::to_string(in.spec().width) +
-              "x" + std::to_string(in.spec().height));
+              std::to_string(height_px) + " pixels, found " + std::to_string(in.facts().width) +
+              "x" + std::to_string(in.facts().height));
 }
 
 }  // namespace dtr::io

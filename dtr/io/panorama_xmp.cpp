@@ -1,7 +1,5 @@
 #include "dtr/io/panorama_xmp.h"
 
-#include <OpenImageIO/imageio.h>
-
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -123,10 +121,13 @@ std::optional<PanoramaXmp> ReadPanoramaXmp(const fs::path& file) {
 }
 
 void WritePanoramaJpeg(const fs::path& file, const ImageRgb8& image, int quality) {
-  OIIO::ImageSpec spec(image.width(), image.height(), 3, OIIO::TypeDesc::UINT8);
-  spec.attribute("CompressionQuality", std::clamp(quality, 1, 100));
-  spec.attribute("jpeg:subsampling", "4:4:4");
-  std::string jpeg = EncodeImage(".jpg", spec, OIIO::TypeDesc::UINT8, image.data().data());
+  const ImageToWrite photo{
+      image.width(),
+      image.height(),
+      3,
+      Sample::kUint8,
+      {{"CompressionQuality", std::clamp(quality, 1, 100)}, {"jpeg:subsampling", "4:4:4"}}};
+  std::string jpeg = EncodeImage(".jpg", photo, Sample::kUint8, image.data().data());
   const std::string width = std::to_string(image.width()), height = std::to_string(image.height());
   const std::string xmp =
       "<x:xmpmeta xmlns:x=\"adobe:ns:meta/\"><rdf:RDF "

@@ -18,8 +18,6 @@ namespace dtr::io {
 namespace {
 
 namespace fs = std::filesystem;
-using OIIO::ImageSpec;
-using OIIO::TypeDesc;
 
 constexpr double kSamePrimaries = 2e-3;  // of chromaticities, which programs round
 constexpr int kSameLevels = 2;           // of 255: a profile of sRGB itself, in some version
@@ -34,15 +32,6 @@ struct TransformDeleter {
 using Profile = std::unique_ptr<void, ProfileCloser>;
 using Transform = std::unique_ptr<void, TransformDeleter>;
 
-bool IsFloatSpec(const ImageSpec& spec) { return spec.format.is_floating_point(); }
-
-std::vector<std::uint8_t> IccOf(const ImageSpec& spec) {
-  const OIIO::ParamValue* icc = spec.find_attribute("ICCProfile");
-  if (icc == nullptr || icc->type().basetype != TypeDesc::UINT8) return {};
-  const auto* bytes = static_cast<const std::uint8_t*>(icc->data());
-  return {bytes, bytes + icc->datasize()};
-}
-
 bool AreSrgbs(const Primaries& primaries) {
   const Primaries srgb;
   const auto same = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
@@ -53,11 +42,9 @@ bool AreSrgbs(const Primaries& primaries) {
 }
 
 // OpenEXR's attribute: x and y of red, green, blue and white.
-std::optional<ColourCoding> CodingOfChromaticities(const ImageSpec& spec) {
-  const OIIO::ParamValue* found = spec.find_attribute("chromaticities");
-  if (found == nullptr || found->type().basevalues() != 8) return {};
-  std::array<double, 8> v{};
-  for (int i = 0; i < 8; ++i) v[static_cast<size_t>(i)] = found->get_float_indexed(i);
+std::optional<ColourCoding> CodingOfChromaticities(const ImageFacts& facts) {
+  const std::vector<float> v = facts.Floats("chromaticities");
+  if (v.size() != 8) return {};
   ColourCoding coding;
   coding.transfer = Transfer::kLinear;
   coding.primaries = {{v[0], v[1]}, {v[2], v[3]}, {v[4], v[5]}, {v[6], v[7]}};
@@ -65,12 +52,11 @@ std::optional<ColourCoding> CodingOfChromaticities(const ImageSpec& spec) {
 }
 
 // Cameras set to Adobe RGB write no profile but this (DCF 2.0, "optional colour space").
-bool IsAdobeRgbByExif(const ImageSpec& spec) {
+bool IsAdobeRgbByExif(const ImageFacts& facts) {
   constexpr int kAdobe = 2, kUncalibrated = 65535;
-  const int space = spec.get_int_attribute("Exif:ColorSpace", 1);
+  const int space = facts.Int("Exif:ColorSpace", 1);
   if (space == kAdobe) return true;
-  return space == kUncalibrated &&
-         std::string(spec.get_string_attribute("Exif:InteroperabilityIndex")).starts_with("R03");
+  return space == kUncalibrated && facts.Text("Exif:InteroperabilityIndex").starts_with("R03");
 }
 
 ColourCoding AdobeRgb() {
@@ -95,41 +81,40 @@ T NumberOf(float value) {
 }
 
 // Channels of an EXR may be anything.
-void RequireExrOfColours(const ImageSpec& spec, const fs::path& file) {
-  if (spec.x != spec.full_x || spec.y != spec.full_y || spec.width != spec.full_width ||
-      spec.height != spec.full_height) {
+void RequireExrOfColours(const ImageFacts& facts, const fs::path& file) {
+  if (facts.x != facts.full_x || facts.y != facts.full_y || facts.width != facts.full_width ||
+      facts.height != facts.full_height) {
     throw Error(fmt::format(
         "{}: its data window ({}x{} from {}, {}) is not its display window ({}x{} from {}, {}): a "
         "photo must fill its display window and not exceed it; crop or pad it to that",
-        file.string(), spec.width, spec.height, spec.x, spec.y, spec.full_width, spec.full_height,
-        spec.full_x, spec.full_y));
+        file.string(), facts.width, facts.height, facts.x, facts.y, facts.full_width,
+        facts.full_height, facts.full_x, facts.full_y));
   }
   const auto last_part = [](const std::string& name) {
     return name.substr(name.rfind('.') == std::string::npos ? 0 : name.rfind('.') + 1);
   };
   std::string first;
-  for (size_t i = 0; i < 3 && i < spec.channelnames.size(); ++i) {
-    first += last_part(spec.channelnames[i]);
+  for (size_t i = 0; i < 3 && i < facts.channel_names.size(); ++i) {
+    first += last_part(facts.channel_names[i]);
   }
   // OpenImageIO 2.5 gives them as R, G and B, and says so.
-  if (spec.get_int_attribute("openexr:luminancechroma") != 0 || first == "YRYBY" ||
-      first == "YBYRY" || first == "BYRYY" || first == "BYYRY" || first == "RYBYY" ||
-      first == "RYYBY") {
+  if (facts.Int("openexr:luminancechroma", 0) != 0 || first == "YRYBY" || first == "YBYRY" ||
+      first == "BYRYY" || first == "BYYRY" || first == "RYBYY" || first == "RYYBY") {
     throw Error(
         fmt::format("{}: a luminance-chroma EXR is not supported; write it as RGB", file.string()));
   }
-  if (spec.nchannels >= 3 && first != "RGB" && first != "rgb") {
+  if (facts.channels >= 3 && first != "RGB" && first != "rgb") {
     throw Error(
         fmt::format("{}: an EXR of a photo needs the channels R, G and B (or Y alone), its "
                     "channels are {}",
-                    file.string(), NamesOf(spec.channelnames)));
+                    file.string(), NamesOf(facts.channel_names)));
   }
 }
 
 // libtiff converts these with constants of its own: CIELab without adapting its white.
-void RequireTiffOfColours(const ImageSpec& spec, const fs::path& file) {
+void RequireTiffOfColours(const ImageFacts& facts, const fs::path& file) {
   constexpr std::array<int, 5> kOthers{8, 9, 10, 32844, 32845};  // three of Lab, LogL, LogLuv
-  const int photometric = spec.get_int_attribute("tiff:PhotometricInterpretation", 2);
+  const int photometric = facts.Int("tiff:PhotometricInterpretation", 2);
   if (std::find(kOthers.begin(), kOthers.end(), photometric) == kOthers.end()) return;
   throw Error(fmt::format("{}: a TIFF of {} colours is not supported; export it as sRGB",
                           file.string(), photometric < 11 ? "Lab" : "logarithmic"));
@@ -225,26 +210,27 @@ void PhotoColours::Conversion::ByNumbers(const float* values, size_t pixels,
   by_numbers->Convert(numbers.data(), pixels, out);
 }
 
-PhotoColours::PhotoColours(const ImageSpec& spec, const std::string& format, const fs::path& file) {
+PhotoColours::PhotoColours(const ImageFacts& facts, const std::string& format,
+                           const fs::path& file) {
   const FileColours stated = ReadFileColours(file);
   if (!stated.unsupported.empty()) {
     throw Error(fmt::format("{}: {} are not supported; export it as sRGB", file.string(),
                             stated.unsupported));
   }
-  const bool is_exr = !spec.channelnames.empty() && format == "openexr";
-  if (is_exr) RequireExrOfColours(spec, file);
-  RequireTiffOfColours(spec, file);
+  const bool is_exr = !facts.channel_names.empty() && format == "openexr";
+  if (is_exr) RequireExrOfColours(facts, file);
+  RequireTiffOfColours(facts, file);
   std::optional<ColourCoding> coding = stated.coding;
-  if (!coding && IsFloatSpec(spec)) coding = CodingOfChromaticities(spec);
-  const std::vector<std::uint8_t> icc = stated.icc.empty() ? IccOf(spec) : stated.icc;
-  if (!coding && icc.empty() && IsAdobeRgbByExif(spec)) coding = AdobeRgb();
+  if (!coding && IsFloat(facts.sample)) coding = CodingOfChromaticities(facts);
+  const std::vector<std::uint8_t> icc = stated.icc.empty() ? facts.Bytes("ICCProfile") : stated.icc;
+  if (!coding && icc.empty() && IsAdobeRgbByExif(facts)) coding = AdobeRgb();
 
   auto conversion = std::make_unique<Conversion>();
-  conversion->linear_floats = IsFloatSpec(spec);
-  conversion->eight_bits = spec.format.basetype == TypeDesc::UINT8;
+  conversion->linear_floats = IsFloat(facts.sample);
+  conversion->eight_bits = facts.sample == Sample::kUint8;
   if (coding) {
     const bool same_transfer =
-        coding->transfer == (IsFloatSpec(spec) ? Transfer::kLinear : Transfer::kSrgb);
+        coding->transfer == (IsFloat(facts.sample) ? Transfer::kLinear : Transfer::kSrgb);
     if (AreSrgbs(coding->primaries)) coding->primaries = {};
     if (same_transfer && AreSrgbs(coding->primaries)) return;
     try {
@@ -258,7 +244,7 @@ PhotoColours::PhotoColours(const ImageSpec& spec, const std::string& format, con
   }
   if (icc.empty()) return;
   std::string why_not;
-  if (!conversion->UseProfile(icc, spec.nchannels >= 3 ? 3 : 1, why_not)) {
+  if (!conversion->UseProfile(icc, facts.channels >= 3 ? 3 : 1, why_not)) {
     remarks_.push_back(why_not);
   } else if (!conversion->ChangesNothing()) {
     conversion_ = std::move(conversion);

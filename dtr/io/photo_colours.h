@@ -1,11 +1,11 @@
 // dtr/io/photo_colours.h -- internal: from the colours that a photo's file states to sRGB.
 #pragma once
-#include <OpenImageIO/imageio.h>
-
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
+
+#include "dtr/io/image_codecs.h"
 
 namespace dtr::io {
 
@@ -15,7 +15,7 @@ class PhotoColours {
  public:
   /// `format` as OpenImageIO names it, whatever the file is called. Throws Error with one line
   /// where the file's colours or windows are not supported.
-  PhotoColours(const OIIO::ImageSpec& spec, const std::string& format,
+  PhotoColours(const ImageFacts& facts, const std::string& format,
                const std::filesystem::path& file);
   ~PhotoColours();
 

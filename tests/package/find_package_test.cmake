@@ -28,8 +28,10 @@ run(${CMAKE_COMMAND} -S ${EXAMPLES} -B ${WORK}/examples -G Ninja -D CMAKE_PREFIX
   -D CMAKE_FIND_USE_PACKAGE_REGISTRY=OFF)
 run(${CMAKE_COMMAND} --build ${WORK}/examples)
 
-run(${prefix}/bin/dtr dataset make plane -o ${WORK}/plane --views 3 --width 64 --height 48)
-run(${prefix}/bin/dtr import --cameras ${WORK}/plane/cameras.json --images ${WORK}/plane/images
+# The program finds its module from a link on the PATH, too.
+file(CREATE_LINK ${prefix}/bin/dtr ${WORK}/dtr SYMBOLIC)
+run(${WORK}/dtr dataset make plane -o ${WORK}/plane --views 3 --width 64 --height 48)
+run(${WORK}/dtr import --cameras ${WORK}/plane/cameras.json --images ${WORK}/plane/images
   --depth ${WORK}/plane/depth -o ${WORK}/plane.dtr)
 run(${WORK}/examples/render_path ${WORK}/plane.dtr ${WORK}/path)
 if(NOT EXISTS ${WORK}/path/000011.png OR NOT output MATCHES "000011.png: [0-9.]+ % seen")
@@ -46,6 +48,16 @@ if(PYTHON)
   if(NOT output MATCHES "${prefix}/${PYTHON_DIR}/dtr/__init__.py .48, 64.")
     message(FATAL_ERROR "python: expected the installed package and depth of 48 x 64, found\n${output}")
   endif()
+endif()
+# Without its module the program describes sets, and one line says why it renders none.
+file(GLOB_RECURSE module ${prefix}/lib*/dtr/dtr_images.so)
+list(FILTER module EXCLUDE REGEX python)
+file(REMOVE ${module})
+run(${prefix}/bin/dtr info ${WORK}/plane.dtr)
+execute_process(COMMAND ${prefix}/bin/dtr render ${WORK}/plane.dtr --like 0001 -o ${WORK}/x.png
+  RESULT_VARIABLE code ERROR_VARIABLE output)
+if(NOT code EQUAL 1 OR NOT output MATCHES "dtr: images cannot be read or written, as a library cannot be loaded: dtr_images.so: [^\n]*\n$")
+  message(FATAL_ERROR "render: expected an error about dtr_images.so, found ${code}: ${output}")
 endif()
 # Photos to set needs COLMAP and minutes; here it must link, and say what it wants.
 execute_process(COMMAND ${WORK}/examples/photos_to_set ${WORK}/nothing ${WORK}/x.dtr
