@@ -144,7 +144,12 @@ RenderedFile Facts(const std::string& file, double ms, size_t frame, const Rende
 RenderReport Render(const RenderRequest& request,
                     const std::function<eval::RenderFunction()>& make_renderer,
                     Progress& progress) {
-  const DtrSet described = io::ReadSet(request.set);
+  return Render(request, io::ReadSet(request.set), make_renderer, progress);
+}
+
+RenderReport Render(const RenderRequest& request, const DtrSet& described,
+                    const std::function<eval::RenderFunction()>& make_renderer,
+                    Progress& progress) {
   const auto cameras = CamerasOf(request, described, progress);
   RequireOneOutput(request);
   RequireMemoryForFrames(request, cameras);
