@@ -49,12 +49,12 @@ std::string ToJson(const pipeline::RenderReport& report) {
   return json.dump(1);
 }
 
-int RunRender(const RenderArguments& options, const Context& context) {
+int RunRender(const RenderArguments& options, const DtrSet& described, const Context& context) {
   pipeline::RenderRequest request = options.request;
   request.render = *options.render;
   request.force = context.common.force;
   const pipeline::RenderReport report = pipeline::Render(
-      request,
+      request, described,
       [&] {
         RequireOutputs(request);  // its cameras are there
         return MakeRenderer(options.renderer, context.console);
@@ -122,8 +122,9 @@ void AddRenderCommand(CLI::App& app) {
             ->type_name("FILE");
         options->render = AddRenderOptions(command, WholeFrames());
         return [options, &command](const Context& context) {
-          UseStoredOptions(command, io::ReadSet(options->request.set), *options->render);
-          return RunRender(*options, context);
+          const DtrSet described = io::ReadSet(options->request.set);
+          UseStoredOptions(command, described, *options->render);
+          return RunRender(*options, described, context);
         };
       });
 }

@@ -1,6 +1,6 @@
 #include "dtr/cpu/setup.h"
 
-#include <algorithm>
+#include <unordered_map>
 
 #include "dtr/base/parallel_for.h"
 #include "dtr/render/exposure.h"
@@ -20,10 +20,9 @@ ViewInNovel InNovel(const View& view, const Pose& novel_from_world) {
 void SetCutFactors(const ViewSelection& selection, const std::vector<int>& order,
                    std::vector<ResolveView>& views) {
   const std::vector<double> factors = CutFactors(selection, selection.views.size());
-  for (size_t k = 0; k < factors.size(); ++k) {
-    const auto at = std::find(order.begin(), order.end(), selection.views[k]);
-    views[static_cast<size_t>(at - order.begin())].cut_factor = factors[k];
-  }
+  std::unordered_map<int, double> factor_of;
+  for (size_t k = 0; k < factors.size(); ++k) factor_of[selection.views[k]] = factors[k];
+  for (size_t i = 0; i < order.size(); ++i) views[i].cut_factor = factor_of.at(order[i]);
 }
 
 }  // namespace

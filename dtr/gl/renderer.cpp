@@ -120,9 +120,7 @@ class Renderer::Implementation {
     SetCutFactors(selection, fitting, frame);
     if (frame.deferred()) {
       // What no sample is left of at this resolution shows nothing.
-      for (size_t i = frame.views.size(); i-- > 0;) {
-        if (views_.store().DeferredOf(*frame.views[i]) == nullptr) frame.Erase(i);
-      }
+      frame.EraseIf([this](const View& view) { return !views_.store().DeferredOf(view); });
     }
     return {selection.views.begin(),
             selection.views.begin() + static_cast<std::ptrdiff_t>(fitting)};

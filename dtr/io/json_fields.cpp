@@ -9,7 +9,7 @@
 namespace dtr::io {
 namespace {
 
-constexpr int kDeepestNesting = 64;      // recursion of the JSON library stays bounded
+constexpr size_t kDeepestNesting = 64;   // recursion of the JSON library stays bounded
 constexpr size_t kShownCharacters = 60;  // of a wrong value in an error message
 
 std::string Shown(const Json* value) {
@@ -46,33 +46,80 @@ void AppendPretty(const Json& value, const std::string& indent, std::string& out
   out += close;
 }
 
+/// Builds the value that the parser reads, and checks it meanwhile. Json::parse with a callback
+/// would check the same, but looks through the whole array whenever an object in it ends.
+class CheckingBuilder final : public Json::json_sax_t {
+ public:
+  CheckingBuilder(const std::string& text, const std::string& where) : text_(text), where_(where) {}
+  Json Built() { return std::move(root_); }
+
+  bool null() override { return Add(Json()); }
+  bool boolean(bool value) override { return Add(value); }
+  bool number_integer(number_integer_t value) override { return Add(value); }
+  bool number_unsigned(number_unsigned_t value) override { return Add(value); }
+  bool number_float(number_float_t value, const string_t&) override { return Add(value); }
+  bool string(string_t& value) override { return Add(std::move(value)); }
+  bool binary(binary_t& value) override { return Add(std::move(value)); }
+  bool start_object(size_t) override { return Open(Json::object()); }
+  bool end_object() override { return Close(); }
+  bool start_array(size_t) override { return Open(Json::array()); }
+  bool end_array() override { return Close(); }
+  bool key(string_t& key) override {
+    ExpectDepth();
+    Json& object = *open_.back();
+    if (object.contains(key)) {
+      throw Error(where_ + ": the key '" + key + "' stands twice in an object");
+    }
+    field_ = &object[key];
+    return true;
+  }
+  bool parse_error(size_t position, const std::string&, const Json::exception& error) override {
+    if (dynamic_cast<const Json::parse_error*>(&error) == nullptr) {  // beyond the range of double
+      throw Error(where_ + ": expected JSON with finite numbers: " + error.what());
+    }
+    throw Error(where_ + ": expected JSON, found an error after byte " + std::to_string(position) +
+                " of " + std::to_string(text_.size()) + "; is the file whole?");
+  }
+
+ private:
+  void ExpectDepth() const {
+    if (open_.size() <= kDeepestNesting) return;
+    throw Error(where_ + ": expected at most " + std::to_string(kDeepestNesting) +
+                " levels of nesting, found more");
+  }
+  Json& Put(Json value) {
+    ExpectDepth();
+    if (open_.empty()) return root_ = std::move(value);
+    if (!open_.back()->is_array()) return *field_ = std::move(value);
+    open_.back()->push_back(std::move(value));
+    return open_.back()->back();
+  }
+  bool Add(Json value) {
+    Put(std::move(value));
+    return true;
+  }
+  bool Open(Json empty) {
+    open_.push_back(&Put(std::move(empty)));
+    return true;
+  }
+  bool Close() {
+    open_.pop_back();
+    return true;
+  }
+
+  const std::string &text_, &where_;
+  Json root_;
+  std::vector<Json*> open_;  // objects and arrays
+  Json* field_ = nullptr;    // of the innermost one, an object: what the next value is for
+};
+
 }  // namespace
 
 Json ParseJson(const std::string& text, const std::string& where) {
-  std::vector<std::set<std::string>> keys;  // of the objects that are open
-  const auto check = [&](int depth, Json::parse_event_t event, const Json& parsed) {
-    if (depth > kDeepestNesting) {
-      throw Error(where + ": expected at most " + std::to_string(kDeepestNesting) +
-                  " levels of nesting, found more");
-    }
-    if (event == Json::parse_event_t::object_start) keys.emplace_back();
-    if (event == Json::parse_event_t::object_end) keys.pop_back();
-    if (event == Json::parse_event_t::key &&
-        !keys.back().insert(parsed.get<std::string>()).second) {
-      throw Error(where + ": the key '" + parsed.get<std::string>() +
-                  "' stands twice in an object");
-    }
-    return true;
-  };
   if (text.empty()) throw Error(where + ": expected JSON, found an empty file; copy it again");
-  try {
-    return Json::parse(text, check);
-  } catch (const Json::parse_error& error) {
-    throw Error(where + ": expected JSON, found an error after byte " + std::to_string(error.byte) +
-                " of " + std::to_string(text.size()) + "; is the file whole?");
-  } catch (const Json::exception& error) {  // a number beyond the range of double
-    throw Error(where + ": expected JSON with finite numbers: " + error.what());
-  }
+  CheckingBuilder builder(text, where);
+  Json::sax_parse(text, &builder);
+  return builder.Built();
 }
 
 std::string PrettyJson(const Json& value, const std::string& where) {

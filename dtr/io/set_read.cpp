@@ -17,6 +17,7 @@
 #include "dtr/io/set_json.h"
 #include "dtr/io/sparse_io.h"
 #include "dtr/io/video_frames.h"
+#include "dtr/types/distinct_views.h"
 
 namespace dtr::io {
 namespace {
@@ -262,14 +263,17 @@ SparseScene LoadSparse(const fs::path& set_folder, const DtrSet& set) {
 std::vector<std::string> CollapseDuplicates(DtrSet& set) {
   std::vector<std::string> removed;
   for (Frame& frame : set.frames) {
+    std::vector<const View*> views;
+    for (const View& view : frame.views) views.push_back(&view);
+    const auto image_of = [](const View& v) { return v.image_file ? v.image_file->sha256 : ""; };
+    const std::vector<size_t> distinct = DistinctViews(views, image_of, AreDuplicates);
+    if (distinct.size() == views.size()) continue;
     std::vector<View> kept;
-    for (View& view : frame.views) {
-      const bool seen = std::any_of(kept.begin(), kept.end(),
-                                    [&](const View& v) { return AreDuplicates(v, view); });
-      if (seen) {
-        removed.push_back(view.id);
+    for (size_t i = 0; i < frame.views.size(); ++i) {
+      if (kept.size() < distinct.size() && distinct[kept.size()] == i) {
+        kept.push_back(std::move(frame.views[i]));
       } else {
-        kept.push_back(std::move(view));
+        removed.push_back(frame.views[i].id);
       }
     }
     frame.views = std::move(kept);

@@ -25,21 +25,24 @@ double ClippedOf(const View& view, const Eigen::Vector3d& exposure) {
 Eigen::Vector3d FrameExposure(const RenderScene& scene, const ViewSelection& selection,
                               const Pose& novel_from_world) {
   const std::vector<double> cut_factors = CutFactors(selection, selection.views.size());
+  std::vector<double> cut_factor_of(scene.views.size());
+  for (size_t k = 0; k < cut_factors.size(); ++k) {
+    cut_factor_of[static_cast<size_t>(selection.views[k])] = cut_factors[k];
+  }
   const Eigen::Vector3d novel_center = novel_from_world.TargetOriginInSource();
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double total = 0;
   bool any = false;
   for (const int index : CanonicalOrder(scene, selection.views)) {
     const View& view = *scene.views[static_cast<size_t>(index)];
-    const auto k = static_cast<size_t>(
-        std::find(selection.views.begin(), selection.views.end(), index) - selection.views.begin());
     any = any || view.gain != Eigen::Vector3d::Ones();
     const Eigen::Vector3d center = view.CenterInWorld();
     const double reach = (center - scene.center).norm();
     const double turn = novel_from_world.rotation.angularDistance(view.cam_from_world.rotation);
     const double apart = std::max(
         std::hypot((center - novel_center).norm(), kTurnShare * reach * turn), kSamePlace * reach);
-    const double weight = apart > 0 ? cut_factors[k] / (apart * apart) : 1;
+    const double weight =
+        apart > 0 ? cut_factor_of[static_cast<size_t>(index)] / (apart * apart) : 1;
     sum += weight * view.gain.array().log().matrix();
     total += weight;
   }

@@ -4,6 +4,7 @@
 #include <limits>
 #include <string>
 #include <tuple>
+#include <unordered_map>
 
 #include "dtr/base/error.h"
 #include "dtr/render/exposure.h"
@@ -103,10 +104,11 @@ RenderFrame MakeFrame(const RenderScene& scene, const PinholeCamera& novel,
 
 void SetCutFactors(const ViewSelection& selection, size_t count, RenderFrame& frame) {
   const std::vector<double> factors = CutFactors(selection, count);
-  for (size_t k = 0; k < count; ++k) {
-    const View* view = frame.scene.views[static_cast<size_t>(selection.views[k])];
-    const auto at = std::find(frame.views.begin(), frame.views.end(), view);
-    frame.cut_factors[static_cast<size_t>(at - frame.views.begin())] = factors[k];
+  const std::vector<const View*> nearest_first = NearestFirst(frame.scene, selection);
+  std::unordered_map<const View*, double> factor_of;
+  for (size_t k = 0; k < count; ++k) factor_of.emplace(nearest_first[k], factors[k]);
+  for (size_t i = 0; i < frame.views.size(); ++i) {
+    frame.cut_factors[i] = factor_of.at(frame.views[i]);
   }
 }
 

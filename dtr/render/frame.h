@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "dtr/render/options.h"
@@ -60,11 +61,17 @@ struct RenderFrame {
   std::vector<double> cut_factors;                     ///< SPEC 1.4, of the views
   Eigen::Vector3d exposure = Eigen::Vector3d::Ones();  ///< SPEC 4.9
 
-  void Erase(size_t view) {
-    const auto at = static_cast<std::ptrdiff_t>(view);
-    views.erase(views.begin() + at);
-    placements.erase(placements.begin() + at);
-    cut_factors.erase(cut_factors.begin() + at);
+  void EraseIf(const std::function<bool(const View&)>& leaves) {
+    size_t kept = 0;
+    for (size_t i = 0; i < views.size(); ++i) {
+      if (leaves(*views[i])) continue;
+      views[kept] = views[i];
+      placements[kept] = placements[i];
+      cut_factors[kept++] = cut_factors[i];
+    }
+    views.resize(kept);
+    placements.resize(kept);
+    cut_factors.resize(kept);
   }
   /// SPEC 4.4: some photo has clipped what is no white in this image.
   bool AnyClipped() const {

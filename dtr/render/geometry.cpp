@@ -3,14 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "dtr/base/error.h"
 #include "dtr/base/order_statistics.h"
+#include "dtr/render/nearest_by_angle.h"
 
 namespace dtr {
 namespace {
 
-constexpr int kNeighbours = 4;           // docs/FORMAT.md, reference_baseline
 constexpr int kSamplesPerAxis = 64;      // 4096 points a view place a median to a percent or two
 constexpr double kLowPercentile = 0.01;  // beyond lie stray points of stereo and SfM
 constexpr double kHighPercentile = 0.99;
@@ -20,6 +21,13 @@ double Median(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   const size_t half = values.size() / 2;
   return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
+}
+
+double MedianDistance(const Eigen::Vector3d& center, const std::vector<Eigen::Vector3d>& others) {
+  if (others.empty()) return 0;
+  std::vector<double> distances;
+  for (const Eigen::Vector3d& other : others) distances.push_back((center - other).norm());
+  return Median(std::move(distances));
 }
 
 SceneExtent ExtentOf(std::vector<double> (&coordinates)[3]) {
@@ -66,29 +74,16 @@ double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 double ReferenceBaseline(const Pose& cam_from_world, std::span<const Pose> others_from_world,
                          const Eigen::Vector3d& scene_center) {
   const Eigen::Vector3d center = cam_from_world.TargetOriginInSource();
-  std::vector<std::pair<double, double>> angle_and_distance;
-  angle_and_distance.reserve(others_from_world.size());
-  for (const Pose& other_from_world : others_from_world) {
-    const Eigen::Vector3d other = other_from_world.TargetOriginInSource();
-    angle_and_distance.emplace_back(AngleBetween(center - scene_center, other - scene_center),
-                                    (center - other).norm());
-  }
-  if (angle_and_distance.empty()) return 0;
-  std::stable_sort(angle_and_distance.begin(), angle_and_distance.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
-  angle_and_distance.resize(std::min<size_t>(angle_and_distance.size(), kNeighbours));
-  std::vector<double> distances;
-  for (const auto& [angle, distance] : angle_and_distance) distances.push_back(distance);
-  return Median(std::move(distances));
+  return MedianDistance(center, NearestByAngle(others_from_world, scene_center).Of(center, {}));
 }
 
 std::vector<double> ReferenceBaselines(std::span<const Pose> cam_from_world,
                                        const Eigen::Vector3d& scene_center) {
+  const NearestByAngle nearest(cam_from_world, scene_center);
   std::vector<double> baselines;
   for (size_t i = 0; i < cam_from_world.size(); ++i) {
-    std::vector<Pose> others(cam_from_world.begin(), cam_from_world.end());
-    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
-    baselines.push_back(ReferenceBaseline(cam_from_world[i], others, scene_center));
+    const Eigen::Vector3d center = cam_from_world[i].TargetOriginInSource();
+    baselines.push_back(MedianDistance(center, nearest.Of(center, i)));
   }
   return baselines;
 }
@@ -152,14 +147,17 @@ void FinishGeometry(DtrSet& set, const SceneExtent& extent) {
   set.scene_center = extent.center;
   set.bounds = extent.bounds;
   for (Frame& frame : set.frames) {
+    std::vector<Pose> sources;
+    for (const View& view : frame.views) {
+      if (view.role == ViewRole::kSource) sources.push_back(view.cam_from_world);
+    }
+    const NearestByAngle nearest(sources, set.scene_center);
+    size_t source = 0;
     for (View& view : frame.views) {
-      std::vector<Pose> sources;
-      for (const View& other : frame.views) {
-        if (&other != &view && other.role == ViewRole::kSource) {
-          sources.push_back(other.cam_from_world);
-        }
-      }
-      view.reference_baseline = ReferenceBaseline(view.cam_from_world, sources, set.scene_center);
+      std::optional<size_t> self;
+      if (view.role == ViewRole::kSource) self = source++;
+      const Eigen::Vector3d center = view.CenterInWorld();
+      view.reference_baseline = MedianDistance(center, nearest.Of(center, self));
     }
   }
 }

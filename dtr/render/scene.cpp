@@ -1,11 +1,13 @@
 #include "dtr/render/scene.h"
 
 #include <algorithm>
+#include <set>
 
 #include "dtr/base/error.h"
 #include "dtr/base/order_statistics.h"
 #include "dtr/base/size_text.h"
 #include "dtr/render/time_steps.h"
+#include "dtr/types/distinct_views.h"
 
 namespace dtr {
 namespace {
@@ -49,20 +51,23 @@ void RequireLoaded(const View& view) {
 RenderScene DescribeRenderScene(const DtrSet& set, std::span<const std::string> excluded_names) {
   RequireOneFrame(set);
   const std::vector<View>& views = set.frames.front().views;
+  std::set<std::string> excluded(excluded_names.begin(), excluded_names.end()), unknown = excluded;
+  for (const View& view : views) {
+    if (unknown.empty()) break;
+    unknown.erase(view.id);
+    unknown.erase(view.name);
+  }
   for (const std::string& name : excluded_names) {
-    if (std::none_of(views.begin(), views.end(),
-                     [&](const View& v) { return v.id == name || v.name == name; })) {
-      throw UsageError("`exclude`: expected the name of a view, found '" + name +
-                       "'; `dtr info` lists the names");
-    }
+    if (!unknown.contains(name)) continue;
+    throw UsageError("`exclude`: expected the name of a view, found '" + name +
+                     "'; `dtr info` lists the names");
   }
   RenderScene scene;
   scene.center = set.scene_center;
   scene.bounds = set.bounds;
   for (const View& view : views) {
-    const auto names_it = [&](const std::string& n) { return n == view.id || n == view.name; };
     if (view.role != ViewRole::kSource) continue;
-    if (std::any_of(excluded_names.begin(), excluded_names.end(), names_it)) continue;
+    if (excluded.contains(view.id) || excluded.contains(view.name)) continue;
     scene.views.push_back(&view);
   }
   std::stable_sort(scene.views.begin(), scene.views.end(),
@@ -73,12 +78,10 @@ RenderScene DescribeRenderScene(const DtrSet& set, std::span<const std::string> 
 RenderScene MakeRenderScene(const DtrSet& set, std::span<const std::string> excluded_names) {
   RenderScene scene = DescribeRenderScene(set, excluded_names);
   for (const View* view : scene.views) RequireLoaded(*view);
+  const auto none = [](const View&) { return std::string(); };
   std::vector<const View*> distinct;
-  for (const View* view : scene.views) {
-    if (std::none_of(distinct.begin(), distinct.end(),
-                     [&](const View* kept) { return SameContent(*kept, *view); })) {
-      distinct.push_back(view);
-    }
+  for (const size_t i : DistinctViews(scene.views, none, SameContent)) {
+    distinct.push_back(scene.views[i]);
   }
   scene.views = std::move(distinct);
   return scene;

@@ -16,8 +16,10 @@ DtrSet AtFrame(const DtrSet& set, size_t index) {
                      std::to_string(set.frames.size()) +
                      (set.frames.size() == 1 ? " frame" : " frames"));
   }
-  DtrSet still = set;
-  still.frames = {set.frames[index]};
+  // Without the other frames, however many there are.
+  const auto& [unit, origin, center, bounds, frames, sparse, provenance, validation, extra] = set;
+  DtrSet still{unit, origin, center, bounds, {}, sparse, provenance, validation, extra};
+  still.frames.push_back(frames[index]);
   if (index > 0) still.sparse_file.reset();
   return still;
 }

@@ -59,16 +59,19 @@ ViewSelection SelectViews(const RenderScene& scene, const Pose& novel_from_world
     candidates.push_back({angle, (center - novel_center).norm(), static_cast<int>(i)});
   }
   // SPEC 1.2: by angle, then by distance, then by id: the order of the input never decides.
-  std::sort(candidates.begin(), candidates.end(), [&](const Candidate& a, const Candidate& b) {
+  const auto before = [&](const Candidate& a, const Candidate& b) {
     const std::string& id_a = scene.views[static_cast<size_t>(a.index)]->id;
     const std::string& id_b = scene.views[static_cast<size_t>(b.index)]->id;
     return std::tie(a.angle_rad, a.distance, id_a, a.index) <
            std::tie(b.angle_rad, b.distance, id_b, b.index);
-  });
+  };
   selection.next_angle_rad = options.max_angle_rad;
   const size_t most =
       std::min(static_cast<size_t>(options.views), scene.max_views.value_or(candidates.size()));
-  if (!selection.per_pixel && candidates.size() > most) {
+  const bool cut = !selection.per_pixel && candidates.size() > most;
+  const auto sorted = static_cast<std::ptrdiff_t>(cut ? most + 1 : candidates.size());
+  std::partial_sort(candidates.begin(), candidates.begin() + sorted, candidates.end(), before);
+  if (cut) {
     selection.next_angle_rad = candidates[most].angle_rad;
     candidates.resize(most);
   }

@@ -5,12 +5,14 @@
 #include <condition_variable>
 #include <deque>
 #include <exception>
+#include <functional>
 #include <mutex>
 #include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <system_error>
 #include <thread>
+#include <tuple>
 
 #include "dtr/base/error.h"
 #include "dtr/base/memory_budget.h"
@@ -129,10 +131,12 @@ ViewStream::ViewStream(DtrSet& set, std::vector<RenderScene> described, Loader l
     first_slot_.push_back(slots_.size());
     std::vector<View>& views = set.frames[frame].views;
     for (const View* view : described_[frame].views) {
-      const auto own = std::find_if(views.begin(), views.end(),
-                                    [&](const View& candidate) { return &candidate == view; });
-      if (own == views.end()) throw std::invalid_argument("ViewStream: a view of another set");
-      slots_.push_back({&*own, State::kAbsent, false, BytesOf(*own), 0, {}});
+      constexpr std::less<> before;  // of pointers into whatever arrays
+      if (before(view, views.data()) || !before(view, views.data() + views.size())) {
+        throw std::invalid_argument("ViewStream: a view of another set");
+      }
+      View& own = views[static_cast<size_t>(view - views.data())];
+      slots_.push_back({&own, State::kAbsent, false, BytesOf(own), 0, {}});
     }
   }
   first_slot_.push_back(slots_.size());
@@ -144,7 +148,7 @@ ViewStream::~ViewStream() = default;
 std::vector<size_t> ViewStream::NotLost() const {
   std::vector<size_t> slots;
   for (size_t i = first_slot_[shown_]; i < first_slot_[shown_ + 1]; ++i) {
-    if (slots_[i].state != State::kLost && !IsHidden(slots_[i])) slots.push_back(i);
+    if (slots_[i].state != State::kLost && !IsHidden(slots_[i].view)) slots.push_back(i);
   }
   return slots;
 }
@@ -168,8 +172,13 @@ size_t ViewStream::RetryLost(const std::function<bool(const View&)>& may_be_read
   });
 }
 
-bool ViewStream::IsHidden(const Slot& slot) const {
-  return std::find(hidden_.begin(), hidden_.end(), slot.view) != hidden_.end();
+void ViewStream::Hide(std::vector<const View*> views) {
+  hidden_ = std::move(views);
+  std::sort(hidden_.begin(), hidden_.end(), std::less<>());
+}
+
+bool ViewStream::IsHidden(const View* view) const {
+  return std::binary_search(hidden_.begin(), hidden_.end(), view, std::less<>());
 }
 
 RenderScene ViewStream::SceneOf(const std::vector<size_t>& slots) const {
@@ -185,9 +194,7 @@ ViewStream::Needed ViewStream::NeededFor(const Pose& novel_from_world,
   RenderScene scene = SceneOf(candidates);
   // From all views: what was lost so far may depend on what was read ahead.
   RenderScene all = described_.at(shown_);
-  std::erase_if(all.views, [this](const View* view) {
-    return std::find(hidden_.begin(), hidden_.end(), view) != hidden_.end();
-  });
+  std::erase_if(all.views, [this](const View* view) { return IsHidden(view); });
   scene.per_pixel = NeedsPerPixelRule(all, novel_from_world);
   const ViewSelection selection = SelectViews(scene, novel_from_world, options);
   Needed needed{{}, selection.per_pixel, selection.views.size()};
@@ -201,17 +208,26 @@ ViewStream::Needed ViewStream::NeededFor(const Pose& novel_from_world,
   return needed;
 }
 
-bool ViewStream::MakeRoom(size_t bytes) {
+std::vector<ViewStream::Slot*> ViewStream::Droppable() {
+  std::vector<Slot*> slots;
+  for (Slot& slot : slots_) {
+    if (slot.state == State::kPresent && slot.last_used != now_) slots.push_back(&slot);
+  }
+  std::sort(slots.begin(), slots.end(), [](const Slot* a, const Slot* b) {
+    return std::tie(a->last_used, a) > std::tie(b->last_used, b);
+  });
+  return slots;
+}
+
+bool ViewStream::MakeRoom(size_t bytes, std::optional<std::vector<Slot*>>& droppable) {
   while (bytes_ + bytes > settings_.host_bytes) {
-    Slot* oldest = nullptr;
-    for (Slot& slot : slots_) {
-      if (slot.state != State::kPresent || slot.last_used == now_) continue;
-      if (oldest == nullptr || slot.last_used < oldest->last_used) oldest = &slot;
-    }
-    if (oldest == nullptr) return bytes_ == 0;  // one view is kept, however large
-    DropPixels(*oldest->view);
-    oldest->state = State::kAbsent;
-    bytes_ -= oldest->bytes;
+    if (!droppable) droppable = Droppable();
+    if (droppable->empty()) return bytes_ == 0;  // one view is kept, however large
+    Slot& oldest = *droppable->back();
+    droppable->pop_back();
+    DropPixels(*oldest.view);
+    oldest.state = State::kAbsent;
+    bytes_ -= oldest.bytes;
   }
   return true;
 }
@@ -240,10 +256,11 @@ size_t ViewStream::decoded_bytes() const {
 }
 
 void ViewStream::Request(const std::vector<size_t>& slots, Pixels pixels) {
+  std::optional<std::vector<Slot*>> droppable;
   for (const size_t index : slots) {
     Slot& slot = slots_[index];
     if (slot.state != State::kAbsent || IsThere(index, pixels)) continue;
-    if (!MakeRoom(slot.bytes)) return;
+    if (!MakeRoom(slot.bytes, droppable)) return;
     slot.state = State::kReading;
     bytes_ += slot.bytes;
     ++reading_;
@@ -284,10 +301,13 @@ RenderScene ViewStream::SceneFor(const Pose& novel_from_world, const RenderOptio
                                  Wait wait, Pixels pixels) {
   Collect(false);
   Needed needed;
-  for (;;) {
+  for (std::optional<size_t> lost;;) {
     ++now_;
-    RequireAnyReadable();
-    needed = NeededFor(novel_from_world, options);
+    if (lost != lost_.size()) {  // a view that turned out lost makes room for another
+      RequireAnyReadable();
+      needed = NeededFor(novel_from_world, options);
+      lost = lost_.size();
+    }
     for (const size_t slot : needed.slots) slots_[slot].last_used = now_;
     if (pixels == Pixels::kInMemory &&
         std::any_of(needed.slots.begin(), needed.slots.end(),
@@ -300,9 +320,10 @@ RenderScene ViewStream::SceneFor(const Pose& novel_from_world, const RenderOptio
       break;
     }
     // Needed views fit in memory once nothing else does: what is missing is being read, or waits
-    // for the room of an earlier request. A view that turns out lost makes place for another.
+    // for the room of an earlier request.
     assert(reading_ > 0);
-    Collect(true);
+    // Not for each of many alone: all are looked through again.
+    for (const int enough = reading_ / 2; reading_ > enough;) Collect(true);
   }
   const bool all_fit = needed.slots.size() == needed.wanted;
   if (!all_fit) WarnOfRoom(needed.slots.size(), needed.wanted);

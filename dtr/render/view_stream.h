@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -85,7 +86,7 @@ class ViewStream {
   void Release(const View& view);
 
   /// Leaves out these views (pointers into the set), as --exclude does, until the next call.
-  void Hide(std::vector<const View*> views) { hidden_ = std::move(views); }
+  void Hide(std::vector<const View*> views);
 
   /// Lost views for which this says yes are tried again when an image needs them: files come back.
   /// Returns how many. One that fails again for the same reason is not warned of again.
@@ -122,11 +123,14 @@ class ViewStream {
   RenderScene SceneOf(const std::vector<size_t>& slots) const;
   std::vector<size_t> NotLost() const;  ///< nor hidden; of the shown frame
   void RequireAnyReadable() const;
-  bool IsHidden(const Slot& slot) const;
+  bool IsHidden(const View* view) const;
   /// Asks for the absent ones of these, as far as dropping others gives room.
   void Request(const std::vector<size_t>& slots, Pixels pixels);
   bool IsThere(size_t slot, Pixels pixels) const;
-  bool MakeRoom(size_t bytes);
+  /// In memory and not needed now, the one used longest ago last.
+  std::vector<Slot*> Droppable();
+  /// Drops what is Droppable, which it fills in once for all calls of one request.
+  bool MakeRoom(size_t bytes, std::optional<std::vector<Slot*>>& droppable);
   /// Takes over what was read; waits for at least one when `wait`.
   void Collect(bool wait);
   void WarnOfRoom(size_t fitting, size_t wanted);
@@ -137,7 +141,7 @@ class ViewStream {
   std::vector<size_t> first_slot_;  ///< of each frame, and of one more
   size_t shown_ = 0;                ///< frame
   std::vector<Lost> lost_;
-  std::vector<const View*> hidden_;
+  std::vector<const View*> hidden_;  ///< sorted
   size_t bytes_ = 0;
   int reading_ = 0;
   std::uint64_t now_ = 0;  ///< number of this call

@@ -1,44 +1,46 @@
 #include "dtr/render/views_within_room.h"
 
-#include <algorithm>
+#include <unordered_set>
 
 namespace dtr {
-
-size_t ViewsWithinRoom::bytes() const {
-  size_t sum = 0;
-  for (const auto& [view, used] : used_) sum += used.bytes;
-  return sum;
-}
 
 void ViewsWithinRoom::Clear() {
   DropAll();
   used_.clear();
+  by_age_.clear();
+  bytes_ = 0;
+}
+
+void ViewsWithinRoom::Count(const View& view, const Used& use) {
+  Used& used = used_[&view];
+  by_age_.erase({used.last, &view});
+  by_age_.emplace(use.last, &view);
+  bytes_ = bytes_ - used.bytes + use.bytes;
+  used = use;
 }
 
 void ViewsWithinRoom::Drop(const View& view) {
   DropView(view);
-  used_.erase(&view);
+  const auto used = used_.find(&view);
+  bytes_ -= used->second.bytes;
+  by_age_.erase({used->second.last, &view});
+  used_.erase(used);
 }
 
 bool ViewsWithinRoom::DropOldest() {
-  auto oldest = used_.end();
-  for (auto it = used_.begin(); it != used_.end(); ++it) {
-    if (it->second.last == now_) continue;
-    if (oldest == used_.end() || it->second.last < oldest->second.last) oldest = it;
-  }
-  if (oldest == used_.end()) return false;
-  Drop(*oldest->first);
+  if (by_age_.empty() || by_age_.begin()->first == now_) return false;
+  Drop(*by_age_.begin()->second);
   return true;
 }
 
 void ViewsWithinRoom::PutAndCount(const RenderFrame& frame, const std::vector<const View*>& views) {
   Put(frame, views);
-  for (const View* view : views) used_[view] = {BytesOf(*view), now_};
+  for (const View* view : views) Count(*view, {BytesOf(*view), now_});
 }
 
 void ViewsWithinRoom::DropUnusedAndCount(const RenderFrame& frame, const View& view) {
   DropUnused(frame, view);
-  used_[&view].bytes = BytesOf(view);
+  Count(view, {BytesOf(view), used_[&view].last});
 }
 
 size_t ViewsWithinRoom::Prepare(RenderFrame& frame, const std::vector<const View*>& nearest_first) {
@@ -60,14 +62,14 @@ size_t ViewsWithinRoom::PrepareWithinRoom(RenderFrame& frame,
   Begin(frame);
   for (const View* view : nearest_first) {
     const auto found = used_.find(view);
-    if (found != used_.end()) found->second.last = now_ - 1;  // others go first
+    if (found != used_.end()) Count(*view, {found->second.bytes, now_ - 1});  // others go first
   }
   if (AllFit(frame)) {  // made on all cores
     PutAndCount(frame, nearest_first);
     for (const View* view : nearest_first) {
-      if (bytes() > room_bytes_) DropUnusedAndCount(frame, *view);
+      if (bytes_ > room_bytes_) DropUnusedAndCount(frame, *view);
     }
-    while (bytes() > room_bytes_ && DropOldest()) {
+    while (bytes_ > room_bytes_ && DropOldest()) {
     }
     return nearest_first.size();
   }
@@ -75,16 +77,17 @@ size_t ViewsWithinRoom::PrepareWithinRoom(RenderFrame& frame,
   for (const View* view : nearest_first) {
     PutAndCount(frame, {view});
     DropUnusedAndCount(frame, *view);
-    while (bytes() > room_bytes_ && DropOldest()) {
+    while (bytes_ > room_bytes_ && DropOldest()) {
     }
-    if (bytes() > room_bytes_ && fitting > 0) break;
+    if (bytes_ > room_bytes_ && fitting > 0) break;
     ++fitting;
   }
+  std::unordered_set<const View*> leaving;
   for (size_t k = fitting; k < nearest_first.size(); ++k) {
     if (used_.contains(nearest_first[k])) Drop(*nearest_first[k]);
-    const auto at = std::find(frame.views.begin(), frame.views.end(), nearest_first[k]);
-    frame.Erase(static_cast<size_t>(at - frame.views.begin()));
+    leaving.insert(nearest_first[k]);
   }
+  frame.EraseIf([&](const View& view) { return leaving.contains(&view); });
   return fitting;
 }
 

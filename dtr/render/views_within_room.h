@@ -3,7 +3,9 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
-#include <map>
+#include <set>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "dtr/render/frame.h"
@@ -25,7 +27,7 @@ class ViewsWithinRoom {
   /// many views fit.
   size_t Prepare(RenderFrame& frame, const std::vector<const View*>& nearest_first);
 
-  size_t bytes() const;
+  size_t bytes() const { return bytes_; }
   /// True when all of the frame's views fit, whatever they look like: none makes room for another.
   bool AllFit(const RenderFrame& frame) const;
   void Clear();
@@ -56,9 +58,12 @@ class ViewsWithinRoom {
   void DropUnusedAndCount(const RenderFrame& frame, const View& view);
   bool DropOldest();
   void Drop(const View& view);
+  void Count(const View& view, const Used& use);
 
   const size_t room_bytes_;
-  std::map<const View*, Used> used_;  ///< the views that something was prepared of
+  std::unordered_map<const View*, Used> used_;  ///< the views that something was prepared of
+  std::set<std::pair<std::uint64_t, const View*>> by_age_;  ///< the same by Used::last
+  size_t bytes_ = 0;                                        ///< of them all
   std::uint64_t now_ = 0;
 };
 

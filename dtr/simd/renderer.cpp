@@ -88,8 +88,9 @@ class Renderer::Implementation {
     if (!Renderer::Draws(options)) return false;
     const ViewSelection selection = SelectViews(scene, novel_from_world, options);
     const RenderFrame frame = MakeFrame(scene, novel, novel_from_world, options, selection);
+    const bool held = Holds(frame);
     return std::none_of(frame.views.begin(), frame.views.end(), [&](const View* view) {
-      return view->image.empty() && !HoldsOf(frame, *view);
+      return view->image.empty() && !(held && views_.HoldsFor(options, *view));
     });
   }
 
@@ -119,16 +120,14 @@ class Renderer::Implementation {
     const ViewSelection selection = SelectViews(scene, novel_from_world, options);
     PreparedFrame prepared{MakeFrame(scene, novel, novel_from_world, options, selection), {}};
     RenderFrame& frame = prepared.frame;
-    RequirePixels(frame);
     prepared.held = Holds(frame);
+    RequirePixels(frame, prepared.held);
     const size_t wanted = selection.views.size();
     const size_t fitting = views_.Prepare(frame, NearestFirst(scene, selection));
     if (fitting < wanted) WarnOfRoom(fitting, wanted);
     SetCutFactors(selection, fitting, frame);
     // What no sample is left of at this resolution shows nothing.
-    for (size_t i = frame.views.size(); i-- > 0;) {
-      if (!views_.HasSamples(*frame.views[i])) frame.Erase(i);
-    }
+    frame.EraseIf([this](const View& view) { return !views_.HasSamples(view); });
     prepared.views_used.assign(selection.views.begin(),
                                selection.views.begin() + static_cast<std::ptrdiff_t>(fitting));
     return prepared;
@@ -155,14 +154,11 @@ class Renderer::Implementation {
     return ThresholdsNeedNoPixels(frame.views) && views_.AllFit(frame);
   }
 
-  bool HoldsOf(const RenderFrame& frame, const View& view) const {
-    return Holds(frame) && views_.HoldsFor(frame.options, view);
-  }
-
   /// Of views whose pixels went nothing else is needed than what was made of them.
-  void RequirePixels(const RenderFrame& frame) const {
+  void RequirePixels(const RenderFrame& frame, bool held) const {
     for (const View* view : frame.views) {
-      if (!view->image.empty() || !HoldsOf(frame, *view)) RequireLoaded(*view);
+      const bool needed = !view->image.empty() || !held || !views_.HoldsFor(frame.options, *view);
+      if (needed) RequireLoaded(*view);
     }
   }
 

@@ -164,7 +164,12 @@ RenderedFile Facts(double ms, size_t frame, const RenderScene& scene, const Rend
 RenderReport Render(const RenderRequest& request,
                     const std::function<eval::RenderFunction()>& make_renderer,
                     Progress& progress) {
-  const DtrSet described = io::ReadSet(request.set);
+  return Render(request, io::ReadSet(request.set), make_renderer, progress);
+}
+
+RenderReport Render(const RenderRequest& request, const DtrSet& described,
+                    const std::function<eval::RenderFunction()>& make_renderer,
+                    Progress& progress) {
   const auto cameras = CamerasOf(request, described, progress);
   RequireOneOutput(request);
   RequireMemoryForFrames(request, cameras);

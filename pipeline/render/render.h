@@ -62,5 +62,8 @@ struct RenderReport {
 /// interrupted is not left behind; images are, as far as they go.
 RenderReport Render(const RenderRequest& request,
                     const std::function<eval::RenderFunction()>& make_renderer, Progress& progress);
+/// The same of a set that was read, `described`.
+RenderReport Render(const RenderRequest& request, const DtrSet& described,
+                    const std::function<eval::RenderFunction()>& make_renderer, Progress& progress);
 
 }  // namespace dtr::pipeline
