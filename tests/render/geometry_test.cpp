@@ -2,10 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 
 #include "dtr/base/error.h"
+#include "dtr/base/random.h"
 
 namespace dtr {
 namespace {
@@ -52,6 +55,37 @@ TEST(ReferenceBaselines, NearestIsByAngleNotByDistance) {
                                    LookingAlongZFrom({1, 0, 0}), LookingAlongZFrom({2, 0, 0}),
                                    LookingAlongZFrom({3, 0, 0}), LookingAlongZFrom({4, 0, 0})};
   EXPECT_DOUBLE_EQ(ReferenceBaselines(poses, {0, 0, 10})[0], 2.5);  // of 30, 1, 2, 3
+}
+
+TEST(ReferenceBaselines, AreThoseOfAPlainSearch) {
+  const Eigen::Vector3d scene_center(1, 2, 3);
+  Random random(7);
+  std::vector<Pose> poses;
+  for (int i = 0; i < 600; ++i) {
+    const auto coordinate = [&] { return random.Uniform(-5, 5); };
+    Eigen::Vector3d offset(coordinate(), coordinate(), i % 2 == 0 ? 0 : coordinate());
+    if (i % 10 == 0) offset *= 0;                        // at the scene centre
+    if (i % 10 == 1) offset = {0, 0, 1.0 + i % 7};       // one direction, with equal positions
+    if (i % 10 == 2) offset = {1e-15, 0, coordinate()};  // nearly one
+    poses.push_back(LookingAlongZFrom(scene_center + offset));
+  }
+  const std::vector<double> baselines = ReferenceBaselines(poses, scene_center);
+  for (size_t i = 0; i < poses.size(); ++i) {
+    const Eigen::Vector3d here = poses[i].TargetOriginInSource();
+    std::vector<std::tuple<double, size_t, double>> others;  // by angle, then index
+    for (size_t j = 0; j < poses.size(); ++j) {
+      const Eigen::Vector3d there = poses[j].TargetOriginInSource();
+      if (j != i) {
+        others.emplace_back(AngleBetween(here - scene_center, there - scene_center), j,
+                            (here - there).norm());
+      }
+    }
+    std::sort(others.begin(), others.end());
+    std::vector<double> distances;
+    for (size_t k = 0; k < 4; ++k) distances.push_back(std::get<2>(others[k]));
+    std::sort(distances.begin(), distances.end());
+    EXPECT_EQ(baselines[i], 0.5 * (distances[1] + distances[2])) << i;
+  }
 }
 
 TEST(ReferenceBaselines, FewCameras) {
