@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <thread>
 
 namespace dtr {
 
@@ -19,6 +20,8 @@ std::string CpuModel() {
   }
   return "unknown";
 }
+
+int Cores() { return std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
 
 double ProcessCpuMilliseconds() {
   timespec t{};
