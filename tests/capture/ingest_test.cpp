@@ -12,6 +12,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/random.h"
 #include "tests/capture/photo_files.h"
+#include "tests/support/on_threads.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::capture {

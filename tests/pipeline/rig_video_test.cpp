@@ -19,7 +19,7 @@ constexpr double kSameCornerPx = 1e-3;  // the same pixels are looked at
 std::map<std::string, Eigen::Vector2d> SecondCamera(const fs::path& folder) {
   SilentProgress silent;
   const RigPhotos photos =
-      ReadRigPhotos(folder, calib::BoardFromText("chessboard:9x6:25mm"), {}, 2, silent);
+      ReadRigPhotos(folder, calib::BoardFromText("chessboard:9x6:25mm"), {}, silent);
   EXPECT_EQ(photos.cameras.size(), 2u);
   std::map<std::string, Eigen::Vector2d> corners;
   for (const calib::RigView& view : photos.views) {

@@ -8,6 +8,8 @@
 #include <thread>
 #include <vector>
 
+#include "tests/support/on_threads.h"
+
 namespace dtr::pipeline {
 namespace {
 

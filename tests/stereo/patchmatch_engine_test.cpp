@@ -176,6 +176,7 @@ TEST(PatchMatchEngine, InstructionSetsThatRoundAlikeFindTheSameBytes) {
 
 /// The first view after all rounds, with every other view as everyone's neighbour.
 DepthEstimate AfterRounds(const std::vector<StereoView>& views, int threads = 2) {
+  const ThreadLimit limit(threads);
   const auto engine = MakeEngine("patchmatch");
   const int count = static_cast<int>(views.size());
   const auto others = [&](int view) {

@@ -13,6 +13,7 @@
 #include "calib/sfm/run/held_out.h"
 #include "calib/sfm/run/workspace.h"
 #include "dtr/base/error.h"
+#include "dtr/base/parallel_for.h"
 #include "dtr/io/image_io.h"
 #include "tests/calib/colmap/fake_colmap.h"
 #include "tests/calib/colmap/model_test_support.h"
@@ -105,7 +106,7 @@ TEST_F(RunSfmWithFake, SecondRunReturnsTheFrozenModelWithoutRunningCOLMAP) {
   const SfmResult first = Run();
   fake_.ForgetCalls();
   LeaveModel(1, 4);
-  options_.threads = 1;  // threads and memory do not change what was asked
+  const ThreadLimit one(1);  // threads and memory do not change what was asked
   const SfmResult second = Run();
   EXPECT_THAT(fake_.Calls(), ElementsAre());
   testing::ExpectSame(first.model, second.model);

@@ -8,6 +8,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/image_io.h"
+#include "tests/support/on_threads.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::sfm {
@@ -31,7 +32,7 @@ TEST(MostResembling, FallsWithTheDistanceOfTheViewpoints) {
   files.push_back(folder / "blank.png");
   io::WriteImage(files.back(), ImageRgb8(100, 50, 3, std::uint8_t{128}));
   SilentProgress silent;
-  const auto features = SmallFeaturesOf(files, 2, 0, silent);
+  const auto features = SmallFeaturesOf(files, 0, silent);
   EXPECT_TRUE(features.back().descriptors.empty());
   EXPECT_EQ(MostResembling(features[0], std::span(features).subspan(1)).front(), 0u);
   const auto score = [&](size_t i) {
@@ -49,9 +50,12 @@ TEST(PreselectPairs, KeepsTheChainAndIsTheSameForAnyNumberOfThreads) {
   files.insert(files.begin() + 2, folder / "blank.png");
   io::WriteImage(files[2], ImageRgb8(100, 50, 3, std::uint8_t{128}));
   SilentProgress silent;
-  const auto pairs = PreselectPairs(files, {}, 1, 0, silent);
-  EXPECT_EQ(pairs, PreselectPairs(files, {}, 2, 0, silent));
-  EXPECT_EQ(pairs, PreselectPairs(files, {}, 2, 1e-3, silent));  // one photo at a time
+  const auto preselect = [&](double memory_gb) {
+    return PreselectPairs(files, {}, memory_gb, silent);
+  };
+  const auto pairs = OnThreads(1, [&] { return preselect(0); });
+  EXPECT_EQ(pairs, OnThreads(2, [&] { return preselect(0); }));
+  EXPECT_EQ(pairs, OnThreads(2, [&] { return preselect(1e-3); }));  // one photo at a time
   EXPECT_TRUE(std::is_sorted(pairs.begin(), pairs.end()));
   const auto has = [&](size_t a, size_t b) {
     return std::find(pairs.begin(), pairs.end(), std::pair(a, b)) != pairs.end();
@@ -60,7 +64,7 @@ TEST(PreselectPairs, KeepsTheChainAndIsTheSameForAnyNumberOfThreads) {
   EXPECT_TRUE(has(1, 3));   // neighbours across the blank one
   EXPECT_FALSE(has(2, 4));  // which has no other partners
   WriteFileAtomically(folder / "blank.png", "no image");
-  EXPECT_THROW(PreselectPairs(files, {}, 2, 0, silent), Error);
+  EXPECT_THROW(preselect(0), Error);
 }
 
 TEST(ResolveMatching, PreselectsBeyondTheExhaustiveLimit) {
