@@ -12,7 +12,6 @@
 #include "dtr/base/progress.h"
 #include "dtr/io/set_io.h"
 #include "dtr/types/dtr_set.h"
-#include "pipeline/build_part.h"
 #include "pipeline/calibration_report.h"
 #include "pipeline/depth_settings.h"
 #include "pipeline/metres.h"
@@ -40,8 +39,6 @@ struct BuildOptions {
   MetreOptions metres;            ///< places and distances that the refinement holds
   bool force = false;
   std::string force_stage;  ///< of an interrupted run: done again with all after it; "": none
-  /// Does this alone, of a build that others of the same options began or will end (build_part.h).
-  std::optional<BuildPart> part = {};
   int threads = 0;
   std::uint64_t seed = 0;
 };
@@ -65,7 +62,6 @@ struct BuildReport {
   std::optional<DepthPriorReport> prior;  ///< where there was one
   std::vector<io::RunStage> stages;       ///< what each cost
   double peak_memory_mib = 0;             ///< with COLMAP's
-  std::optional<BuildPart> part;          ///< what alone was done; all else is empty then
 };
 
 /// JSON object: set, views[].{name,role,width_px,height_px}, not_registered[], why_not_registered,
@@ -79,8 +75,7 @@ std::string ToJson(const BuildReport& report);
 std::vector<std::string> StagesKept();
 
 /// Builds a set. Continues an interrupted run of the same input and options; throws UsageError when
-/// the output exists (without force) or belongs to another run. With options.part the output is not
-/// there yet when it returns.
+/// the output exists (without force) or belongs to another run.
 BuildReport BuildSet(const BuildOptions& options, Progress& progress);
 
 }  // namespace dtr::pipeline

@@ -51,7 +51,8 @@ SfmSummary SummaryOf(const colmap::SfmReport& report, const calib::SfmModel& mod
 }
 
 CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions& options,
-                         const fs::path& workspace, Progress& progress) {
+                         const fs::path& workspace, const std::optional<colmap::SfmPart>& part,
+                         Progress& progress) {
   std::vector<bool> in_sfm(capture.photos.size(), true);
   if (options.strict) {
     for (size_t i = 0; i < in_sfm.size(); ++i) in_sfm[i] = !options.held_out[i];
@@ -63,7 +64,7 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
     if (!options.lens) break;
     input.known_lens = LensFor(*options.lens, input.width_px, input.height_px, input.name);
   }
-  colmap::SfmOptions sfm_options = SfmOptionsFor(options);
+  colmap::SfmOptions sfm_options = SfmOptionsFor(options, part);
   if (options.lens) {
     sfm_options.intrinsics_are_known = true;
     sfm_options.lens_model = calib::NameOf(options.lens->model);
@@ -73,9 +74,10 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
     sfm_options.intrinsics_are_known = true;
     sfm_options.lens_model = calib::NameOf(calib::CameraModel::kSimplePinhole);
   }
-  PreparePhotos(photos, options, workspace / "photos", progress);
+  PreparePhotos(photos, options, part, workspace / "photos", progress);
   colmap::SfmResult sfm =
-      colmap::RunSfm(workspace / "photos", inputs, workspace / "sfm", sfm_options, progress);
+      colmap::RunSfm(workspace / "photos", inputs, workspace / "sfm", sfm_options, progress, part);
+  if (part) return {};
   if (panoramas) {
     CompletePanoramas(photos, *options.rig, inputs, workspace, sfm_options, sfm, progress);
   }
@@ -115,7 +117,7 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
 void HintAtFisheye(const capture::Capture& capture, const CalibrateOptions& options,
                    Progress& progress) {
   const auto model = calib::CameraModelFromName(options.sfm.lens_model);
-  if (!options.poses.empty() || options.rig || options.lens || IsShared(options.part)) return;
+  if (!options.poses.empty() || options.rig || options.lens) return;
   if (model && calib::IsFisheye(*model)) return;
   const std::string line = capture::LineOfImageCircle(capture.photos);
   if (!line.empty()) progress.Note(line);
@@ -152,8 +154,9 @@ bool IsShared(const std::optional<colmap::SfmPart>& part) {
 }
 
 void PreparePhotos(const capture::Capture& photos, const CalibrateOptions& options,
-                   const fs::path& folder, Progress& progress) {
-  if (IsShared(options.part)) return;  // other processes read them
+                   const std::optional<colmap::SfmPart>& part, const fs::path& folder,
+                   Progress& progress) {
+  if (IsShared(part)) return;  // other processes read them
   capture::PrepareSfmImages(photos, folder, 0, options.threads, options.memory_gb, progress);
 }
 
@@ -171,7 +174,8 @@ std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
   return inputs;
 }
 
-colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options) {
+colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options,
+                                 const std::optional<colmap::SfmPart>& part) {
   colmap::SfmOptions sfm;
   sfm.engine = options.sfm.engine;
   sfm.threads = options.threads;
@@ -182,8 +186,7 @@ colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options) {
   sfm.max_features = options.sfm.features < max_features ? options.sfm.features : 0;
   sfm.matching = options.sfm.matching;
   sfm.lens_model = options.sfm.lens_model;
-  sfm.part = options.part;
-  sfm.folder_is_shared = IsShared(options.part);
+  sfm.folder_is_shared = IsShared(part);
   return sfm;
 }
 
@@ -214,7 +217,8 @@ void RequireCalibration(const fs::path& poses, const std::string& poses_format,
 }
 
 CalibratedPhotos CalibratePhotos(const capture::Capture& capture, const CalibrateOptions& options,
-                                 const fs::path& workspace, Progress& progress) {
+                                 const fs::path& workspace, Progress& progress,
+                                 const std::optional<colmap::SfmPart>& part) {
   CalibrateOptions checked = options;
   if (!checked.rig && checked.poses.empty()) checked.rig = RigOfPanoramas(capture);
   checked.held_out.resize(capture.photos.size(), false);
@@ -224,11 +228,11 @@ CalibratedPhotos CalibratePhotos(const capture::Capture& capture, const Calibrat
     RejectTurned(capture, "the intrinsics are");
     RequireLensOfPhotos(*checked.lens, capture, progress);
   }
-  HintAtFisheye(capture, checked, progress);
+  if (!IsShared(part)) HintAtFisheye(capture, checked, progress);
   fs::create_directories(workspace);
   CalibratedPhotos calibrated = checked.poses.empty()
-                                    ? FromSfm(capture, checked, workspace, progress)
-                                    : FromKnownPoses(capture, checked, workspace, progress);
+                                    ? FromSfm(capture, checked, workspace, part, progress)
+                                    : FromKnownPoses(capture, checked, workspace, part, progress);
   std::set<std::string> registered;
   for (const calib::SfmImage& image : calibrated.model.images) registered.insert(image.name);
   for (const capture::Photo& photo : capture.photos) {

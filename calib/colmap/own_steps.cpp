@@ -202,7 +202,7 @@ void OwnFeatures(Workspace& workspace, const fs::path& database,
         images.begin() + static_cast<std::ptrdiff_t>(part->part.End(images.size())));
     const fs::path file = PartOf(database, part->part);
     AddInBatches(workspace, file, own, KeptOrNew(workspace, file, groups), plan, detect);
-    throw PartDone();
+    return;
   }
   if (part && part->stage != SfmStage::kPairs) {
     throw Error("features: expected those of all photos, found none; run the stage pairs first");
@@ -216,11 +216,10 @@ void OwnFeatures(Workspace& workspace, const fs::path& database,
   parts.Remove();
 }
 
-void OwnMatches(Workspace& workspace, const fs::path& features,
-                const std::vector<CameraGroup>& groups, Matching matching,
-                const SfmOptions& options, bool known_lenses,
-                const std::optional<ImagePairs>& allowed) {
-  GroupLenses known = LensesOf(workspace, groups);
+void OwnMatches(Workspace& workspace, const fs::path& features, const PhotosToMatch& to_match,
+                Matching matching, const SfmOptions& options, const std::optional<SfmPart>& part) {
+  const std::vector<CameraGroup>& groups = to_match.groups;
+  const GroupLenses known = LensesOf(workspace, groups);
   std::vector<sfm::MatchPhoto> photos;
   std::vector<int> group_of(workspace.images().size());
   for (size_t g = 0; g < groups.size(); ++g) {
@@ -234,8 +233,8 @@ void OwnMatches(Workspace& workspace, const fs::path& features,
   sfm::MatchOptions match;
   match.threads = workspace.threads();
   match.seed = options.seed;
-  match.lens_is_known.assign(known.lenses.size(), known_lenses);
-  match.pairs = PairsFor(workspace.images(), matching, allowed);
+  match.lens_is_known.assign(known.lenses.size(), to_match.known_lenses);
+  match.pairs = PairsFor(workspace.images(), matching, to_match.allowed);
   match.preselect = matching == Matching::kPreselected;
   match.load_descriptors = [&](int photo, size_t first) {
     const auto i = static_cast<size_t>(photo);
@@ -244,8 +243,11 @@ void OwnMatches(Workspace& workspace, const fs::path& features,
   match.descriptor_gb = kDescriptorShare * options.memory_gb;
   match.journal = workspace.folder() / "matches.begun";
   match.journal_inputs = workspace.fingerprint();
-  if (options.part) match.part = MatchPartOf(*options.part);
   match.progress = &workspace.progress();
+  if (part) {
+    sfm::MatchPhotos(photos, known.lenses, known.focal_is_known, match, MatchPartOf(*part));
+    return;
+  }
   workspace.RunHere([&] {
     sfm::MatchResult result = sfm::MatchPhotos(photos, known.lenses, known.focal_is_known, match);
     for (const std::string& note : result.notes) workspace.progress().Note(note);

@@ -7,8 +7,7 @@
 #include <vector>
 
 #include "calib/colmap/features.h"
-#include "calib/colmap/matching.h"
-#include "calib/colmap/workspace.h"
+#include "calib/colmap/sfm_steps.h"
 #include "calib/sfm/view_graph.h"
 
 namespace dtr::colmap {
@@ -29,20 +28,18 @@ sfm::Features FeaturesOf(const std::filesystem::path& photo, const std::filesyst
 
 /// Features of all photos into `database`, batch by batch: an interrupted step of the same
 /// fingerprint goes on after the last of them. Features that a process with a part has found are
-/// taken over. `part`: of kFeatures, those of a part of the photos into a database of its own, and
-/// PartDone; a later stage needs `database` and throws Error.
+/// taken over. `part`: of kFeatures, those of a part of the photos into a database of its own; a
+/// later one than kPairs needs `database` and throws Error.
 void OwnFeatures(Workspace& workspace, const std::filesystem::path& database,
                  const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
                  const std::optional<SfmPart>& part);
 
 /// Matches of the features in `features` into the workspace's database, with the lenses that they
-/// determine. `known_lenses`: intrinsics are given and hold; else focal lengths and distortion are
-/// estimated. Of the pairs that `matching` names only those of `allowed`, where it is given. With
-/// options.part only that, and PartDone.
+/// determine: those of `photos` where they are known, else focal lengths and distortion are
+/// estimated. With `part` only this, into a journal.
 void OwnMatches(Workspace& workspace, const std::filesystem::path& features,
-                const std::vector<CameraGroup>& groups, Matching matching,
-                const SfmOptions& options, bool known_lenses,
-                const std::optional<ImagePairs>& allowed);
+                const PhotosToMatch& photos, Matching matching, const SfmOptions& options,
+                const std::optional<SfmPart>& part);
 
 /// What the global mapper made of the workspace's database, photos under their own names.
 struct GloballyMapped {

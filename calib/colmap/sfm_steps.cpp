@@ -42,9 +42,10 @@ calib::CameraModel CameraModelOf(const SfmOptions& options) {
   return *model;
 }
 
-void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& groups,
+void FeaturesAndMatches(Workspace& workspace, const PhotosToMatch& photos,
                         const SfmOptions& options, SfmReport& report,
-                        const std::optional<ImagePairs>& allowed, bool known_lenses) {
+                        const std::optional<SfmPart>& part) {
+  if (part && part->stage == SfmStage::kPhotos) return;  // the workspace has them
   ExtractionPlan plan = PlanExtraction(workspace.images(), workspace.threads(), options.memory_gb,
                                        options.max_image_size_px);
   plan.max_features = options.max_features;
@@ -53,25 +54,27 @@ void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& gr
   report.matching = ResolveMatching(options.matching, workspace.images().size());
 
   const fs::path features = workspace.folder() / "features.db";
-  workspace.Step("features", TextOf(groups, plan, options.seed), [&] {
+  const bool features_alone = part && part->stage == SfmStage::kFeatures;
+  const auto find = [&] {
     if (options.engine == SfmEngine::kColmap) {
-      ExtractFeaturesResumably(workspace, features, groups, plan, options.seed);
+      ExtractFeaturesResumably(workspace, features, photos.groups, plan, options.seed);
     } else {
-      OwnFeatures(workspace, features, groups, plan, options.part);
+      OwnFeatures(workspace, features, photos.groups, plan, part);
     }
-  });
-  if (options.part && options.part->stage == SfmStage::kFeatures) throw PartDone();
+  };
+  workspace.Step("features", TextOf(photos.groups, plan, options.seed), find, features_alone);
+  if (features_alone) return;
   auto text = fmt::format("matching {} seed {}", static_cast<int>(report.matching), options.seed);
-  if (known_lenses && options.engine != SfmEngine::kColmap) text += " known lenses";
+  if (photos.known_lenses && options.engine != SfmEngine::kColmap) text += " known lenses";
   for (const SfmImageInput& image : workspace.images()) {
     if (!image.station.empty()) text += " " + image.station;
   }
-  if (allowed) {
-    for (const auto& [a, b] : *allowed) text += fmt::format(" {}-{}", a, b);
+  if (photos.allowed) {
+    for (const auto& [a, b] : *photos.allowed) text += fmt::format(" {}-{}", a, b);
   }
-  workspace.Step("matches", text, [&] {
+  const auto match = [&] {
     if (options.engine != SfmEngine::kColmap) {
-      OwnMatches(workspace, features, groups, report.matching, options, known_lenses, allowed);
+      OwnMatches(workspace, features, photos, report.matching, options, part);
       return;
     }
     // Matching may take hours: an interrupted run of the same inputs goes on with its pairs.
@@ -84,8 +87,9 @@ void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& gr
       WriteFileAtomically(begun, workspace.fingerprint());
     }
     MatchPhotos(workspace, workspace.database(), report.matching, options.memory_gb, options.seed,
-                allowed);
-  });
+                photos.allowed);
+  };
+  workspace.Step("matches", text, match, part.has_value());
 }
 
 void AllowForwardMotion(Arguments& arguments) {

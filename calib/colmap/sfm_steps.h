@@ -14,13 +14,20 @@ namespace dtr::colmap {
 /// The lens model of the options. Throws UsageError on an unknown name.
 calib::CameraModel CameraModelOf(const SfmOptions& options);
 
+/// What is known of photos before they are matched.
+struct PhotosToMatch {
+  std::vector<CameraGroup> groups;
+  /// Of the pairs that options.matching names only these (a < b, sorted; numbers of images()) are
+  /// matched, where they are given.
+  std::optional<ImagePairs> allowed = {};
+  bool known_lenses = false;  ///< the groups' parameters are given, not guesses
+};
+
 /// Steps "features" and "matches": fills workspace.database(). What was planned goes to `report`.
-/// Of the pairs that options.matching names only those of `allowed` (a < b, sorted; numbers of
-/// images()) are matched, where it is given. `known_lenses`: the groups' parameters are given, not
-/// guesses.
-void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& groups,
+/// `part`: this alone.
+void FeaturesAndMatches(Workspace& workspace, const PhotosToMatch& photos,
                         const SfmOptions& options, SfmReport& report,
-                        const std::optional<ImagePairs>& allowed = {}, bool known_lenses = false);
+                        const std::optional<SfmPart>& part = {});
 
 /// Fills in what every report has: runs, version, who did not register, the error; writes it.
 void CompleteReport(const Workspace& workspace, const calib::SfmModel& model, SfmReport& report);

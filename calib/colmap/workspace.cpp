@@ -281,7 +281,7 @@ void Workspace::WriteModelHere(const fs::path& folder, calib::SfmModel model) co
 }
 
 void Workspace::Step(const std::string& name, const std::string& inputs,
-                     const std::function<void()>& body) {
+                     const std::function<void()>& body, bool is_part) {
   fingerprint_ = HashOfText(fingerprint_ + "\n" + name + "\n" + inputs);
   const fs::path stamp = folder_ / (name + ".done.json");
   if (const auto finished = ReadStamp(stamp, fingerprint_)) {
@@ -299,6 +299,7 @@ void Workspace::Step(const std::string& name, const std::string& inputs,
     ThrowFullDisk(folder_, error.what());
     throw;
   }
+  if (is_part) return;
   SyncTree(folder_);  // the stamp vouches for what COLMAP wrote, which syncs nothing
   WriteStamp(stamp, fingerprint_, std::span(records_).subspan(first_of_step_), {});
 }

@@ -13,10 +13,6 @@ namespace {
 
 void SayResult(const pipeline::BuildOptions& options, const pipeline::BuildReport& report,
                Console& console) {
-  if (report.part) {
-    console.Say(fmt::format("{}: done: {}", options.output.string(), NameOf(*report.part)));
-    return;
-  }
   if (report.set.frames.size() > 1) {
     console.Say(
         fmt::format("{}: {} time steps of:", options.output.string(), report.set.frames.size()));
@@ -52,12 +48,18 @@ void AddBuildCommand(CLI::App& app) {
                  context.console.KeepsWork();
                  FinishBuildArguments(context.common, *arguments);
                  const pipeline::BuildOptions& options = arguments->options;
+                 if (const auto part = PartOf(*arguments)) {
+                   pipeline::RunBuildPart(options, *part, context.console);
+                   context.console.Say(
+                       fmt::format("{}: done: {}", options.output.string(), NameOf(*part)));
+                   return kDone;
+                 }
                  const auto report =
                      arguments->is_dynamic
                          ? pipeline::BuildDynamicSet(options, arguments->dynamic, context.console)
                          : pipeline::BuildSet(options, context.console);
                  SayResult(options, report, context.console);
-                 if (!report.part) context.EmitJson(pipeline::ToJson(report));
+                 context.EmitJson(pipeline::ToJson(report));
                  return kDone;
                };
              });
