@@ -71,20 +71,6 @@ void AddPartOptions(CLI::App& command, BuildArguments& arguments) {
       ->type_name("K/N");
 }
 
-std::optional<pipeline::BuildPart> PartFrom(const BuildArguments& arguments) {
-  if (arguments.stage.empty()) return {};
-  if (arguments.is_dynamic) {
-    throw UsageError("`dynamic`: its time steps follow each other; leave out `stage`");
-  }
-  int index = 0, count = 0, used = 0;
-  const std::string& text = arguments.part;
-  if (std::sscanf(text.c_str(), "%d/%d%n", &index, &count, &used) != 2 ||
-      static_cast<size_t>(used) != text.size() || count < 1 || index < 1 || index > count) {
-    throw UsageError(fmt::format("`part` {}: expected K/N with K from 1 to N", text));
-  }
-  return pipeline::BuildPart{arguments.stage, {index - 1, count}};
-}
-
 }  // namespace
 
 void AddBuildOptions(CLI::App& command, BuildArguments& arguments) {
@@ -150,10 +136,23 @@ void FinishBuildArguments(const CommonOptions& common, BuildArguments& arguments
   pipeline::BuildOptions& options = arguments.options;
   options.metres = MetreOptionsFrom(options.metres.gps, arguments.metre_words);
   options.seed = common.seed;
-  options.part = PartFrom(arguments);
   arguments.dynamic.temporal = arguments.temporal == "on";
   arguments.dynamic.free_clocks = arguments.clocks == "free";
   if (!arguments.video.empty()) arguments.dynamic.video = io::VideoQualityFrom(arguments.video);
+}
+
+std::optional<pipeline::BuildPart> PartOf(const BuildArguments& arguments) {
+  if (arguments.stage.empty()) return {};
+  if (arguments.is_dynamic) {
+    throw UsageError("`dynamic`: its time steps follow each other; leave out `stage`");
+  }
+  int index = 0, count = 0, used = 0;
+  const std::string& text = arguments.part;
+  if (std::sscanf(text.c_str(), "%d/%d%n", &index, &count, &used) != 2 ||
+      static_cast<size_t>(used) != text.size() || count < 1 || index < 1 || index > count) {
+    throw UsageError(fmt::format("`part` {}: expected K/N with K from 1 to N", text));
+  }
+  return pipeline::BuildPart{arguments.stage, {index - 1, count}};
 }
 
 }  // namespace dtr::cli

@@ -41,19 +41,16 @@ class Run {
 
   std::vector<DepthRange> Ranges() { return Widened(Together(), options_.widenings, progress_); }
 
-  void Compute(const std::function<bool(int)>& already_done,
-               const std::function<void(int, DepthEstimate&&, const DepthRange&)>& on_view) {
-    std::vector<int> wanted = Wanted(already_done);
-    if (options_.part) std::erase_if(wanted, [&](int view) { return !IsOfPart(view); });
-    const std::vector<int> needed = Needed(wanted);
-    CheckMemory(needed);
-    // All of them: rounds also match what is not needed itself, and must do so alike every time.
-    if (!needed.empty()) TellStrangers();
-    if (!needed.empty()) ranges_ = Ranges();
-    if (options_.part && options_.part->pass <= engine_.Rounds()) {
-      return RunPass(Together(), wanted, planes_, options_.part->pass, progress_);
-    }
-    if (options_.part) {
+  void Pass(int pass, const std::function<bool(int)>& already_done) {
+    const std::vector<int> wanted = Wanted(already_done);
+    Begin(wanted);
+    RunPass(Together(), wanted, planes_, pass, progress_);
+  }
+
+  void Maps(const std::function<bool(int)>& already_done,
+            const std::function<void(int, DepthEstimate&&, const DepthRange&)>& on_view) {
+    const std::vector<int> wanted = Wanted(already_done), needed = Begin(wanted);
+    if (options_.has_passes) {
       RequirePass(Together(), needed, planes_, engine_.Rounds());
     } else if (engine_.Rounds() > 0) {
       RunRounds(Together(), needed, planes_, progress_);
@@ -82,6 +79,15 @@ class Run {
   }
 
  private:
+  /// Before any work on `wanted`. Returns all views that it needs.
+  std::vector<int> Begin(const std::vector<int>& wanted) {
+    std::vector<int> needed = Needed(wanted);
+    CheckMemory(needed);
+    // All of them: rounds also match what is not needed itself, and must do so alike every time.
+    if (!needed.empty()) TellStrangers();
+    if (!needed.empty()) ranges_ = Ranges();
+    return needed;
+  }
   /// Of an engine that does not say what it takes one at a time within a limit; without one, as
   /// many as threads are left over by a view's pairs.
   int AtOnce(const std::vector<int>& views) {
@@ -90,9 +96,6 @@ class Run {
     return std::max(1, ThreadLimit::Current() / std::max(1, options_.neighbours.count));
   }
   bool Limited() const { return options_.memory_bytes > 0 || options_.load_pixels != nullptr; }
-  bool IsOfPart(int view) const {
-    return options_.part->part.Has(static_cast<size_t>(view), views_.size());
-  }
   bool Filters() const { return options_.consistency.min_agreeing > 0; }
   const std::vector<int>& NeighboursOf(int view) const {
     return neighbours_[static_cast<size_t>(view)].views;
@@ -254,7 +257,13 @@ void ComputeDepthMaps(
     const DepthMapsOptions& options, Progress& progress,
     const std::function<bool(int view)>& already_done,
     const std::function<void(int view, DepthEstimate&&, const DepthRange&)>& on_view) {
-  Run(views, scene, engine, options, progress).Compute(already_done, on_view);
+  Run(views, scene, engine, options, progress).Maps(already_done, on_view);
+}
+
+void ComputeDepthPass(std::span<const StereoView> views, const SparseScene& scene,
+                      const Engine& engine, const DepthMapsOptions& options, int pass,
+                      Progress& progress, const std::function<bool(int view)>& already_done) {
+  Run(views, scene, engine, options, progress).Pass(pass, already_done);
 }
 
 }  // namespace dtr::stereo

@@ -1,11 +1,9 @@
 // stereo/depth_maps.h -- depth maps of a whole collection: neighbours, ranges, engine, filter.
 #pragma once
 #include <functional>
-#include <optional>
 #include <span>
 #include <vector>
 
-#include "dtr/base/part.h"
 #include "dtr/base/progress.h"
 #include "stereo/consistency.h"
 #include "stereo/depth_range.h"
@@ -14,14 +12,6 @@
 #include "stereo/view_paging.h"
 
 namespace dtr::stereo {
-
-/// A pass over a part of the views, by one of several processes that share the stores.
-struct DepthPart {
-  /// 0: the search; 1 and more: the passes of an engine that has any; one more than these: the
-  /// maps.
-  int pass = 0;
-  Part part;
-};
 
 struct DepthMapsOptions {
   NeighbourOptions neighbours;
@@ -33,6 +23,7 @@ struct DepthMapsOptions {
   /// Where planes wait between the rounds of engines that have any, so that an interrupted run can
   /// go on from there; null: in memory, 24 bytes per pixel and view. Borrowed.
   PlaneMapStore* planes = nullptr;
+  bool has_passes = false;  ///< `planes` has all of them (ComputeDepthPass), else it is an Error
   /// Where unfiltered depth maps wait for their neighbours'; null: in memory. Borrowed.
   EstimateStore* estimates = nullptr;
   /// Reads the pixels of views that do not have them in memory; null: all have.
@@ -41,8 +32,6 @@ struct DepthMapsOptions {
   /// stays as long as there is room. 0: no limit. Needs both stores; without `load_pixels` the
   /// views' own pixels come on top. No effect on the result.
   std::uint64_t memory_bytes = 0;
-  /// Does this alone; `planes` must have all of the pass before. Empty: everything.
-  std::optional<DepthPart> part = {};
 };
 
 /// The limit is too low for a single view with its neighbours.
@@ -67,13 +56,18 @@ class NotEnoughMemory : public Error {
 /// engine finds no usable pair, gets a map of holes and a note. Throws what the engine throws,
 /// Error when a depth range is unknown, Interrupted between views, NotEnoughMemory before
 /// any work, UsageError when `given_ranges` has the wrong length.
-/// With `options.part` maps are handed out for views of the part alone, and none before its last
-/// pass; Error where planes of the pass before are missing.
 void ComputeDepthMaps(
     std::span<const StereoView> views, const SparseScene& scene, const Engine& engine,
     const DepthMapsOptions& options, Progress& progress,
     const std::function<bool(int view)>& already_done,
     const std::function<void(int view, DepthEstimate&&, const DepthRange&)>& on_view);
+
+/// One pass of the engine (0: the search) alone, for processes that share the stores, each with
+/// other views to be done. Throws as that does, and Error where planes of the pass before are
+/// missing.
+void ComputeDepthPass(std::span<const StereoView> views, const SparseScene& scene,
+                      const Engine& engine, const DepthMapsOptions& options, int pass,
+                      Progress& progress, const std::function<bool(int view)>& already_done);
 
 /// The depth ranges that ComputeDepthMaps would work with: those of the options, or of the points,
 /// widened where they prove too narrow. Throws as it does.

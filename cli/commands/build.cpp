@@ -22,10 +22,6 @@ pipeline::BuildReport Build(const BuildArguments& arguments, Progress& progress)
 
 void SayResult(const pipeline::BuildOptions& options, const pipeline::BuildReport& report,
                Console& console) {
-  if (report.part) {
-    console.Say(fmt::format("{}: done: {}", options.output.string(), NameOf(*report.part)));
-    return;
-  }
   if (report.set.frames.size() > 1) {
     console.Say(
         fmt::format("{}: {} time steps of:", options.output.string(), report.set.frames.size()));
@@ -61,9 +57,15 @@ void AddBuildCommand(CLI::App& app) {
                  context.console.KeepsWork();
                  FinishBuildArguments(context.common, *arguments);
                  const pipeline::BuildOptions& options = arguments->options;
+                 if (const auto part = PartOf(*arguments)) {
+                   pipeline::RunBuildPart(options, *part, context.console);
+                   context.console.Say(
+                       fmt::format("{}: done: {}", options.output.string(), NameOf(*part)));
+                   return kDone;
+                 }
                  const auto report = Build(*arguments, context.console);
                  SayResult(options, report, context.console);
-                 if (!report.part) context.EmitJson(pipeline::ToJson(report));
+                 context.EmitJson(pipeline::ToJson(report));
                  return kDone;
                };
              });

@@ -1,7 +1,6 @@
 // dtr/base/part.h -- one of several equal parts of a list, each worked on by a process of its own.
 #pragma once
 #include <cstddef>
-#include <exception>
 
 namespace dtr {
 
@@ -22,12 +21,6 @@ struct Part {
     if (count < 1) return 0;
     return items * static_cast<std::size_t>(parts) / static_cast<std::size_t>(count);
   }
-};
-
-/// Ends a run of which one part of one stage was asked, when that is done; no error.
-class PartDone : public std::exception {
- public:
-  const char* what() const noexcept override { return "the part is done"; }
 };
 
 }  // namespace dtr

@@ -1,13 +1,13 @@
 #include "pipeline/build/build.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <chrono>
-#include <nlohmann/json.hpp>
-#include <stdexcept>
 
 #include "calib/sparse_from_sfm.h"
+#include "dtr/base/delete.h"
 #include "dtr/base/error.h"
 #include "dtr/base/machine.h"
 #include "dtr/eval/json.h"
@@ -16,12 +16,12 @@
 #include "dtr/io/set_io.h"
 #include "dtr/io/validation_result.h"
 #include "pipeline/build/advise.h"
+#include "pipeline/build/build_part.h"
 #include "pipeline/build/detail/build_inputs.h"
 #include "pipeline/build/detail/build_json.h"
 #include "pipeline/build/detail/build_options.h"
-#include "pipeline/build/detail/build_share.h"
-#include "pipeline/build/detail/force_stage.h"
 #include "pipeline/build/detail/part_files.h"
+#include "pipeline/build/detail/stages.h"
 #include "pipeline/core/calibrate.h"
 #include "pipeline/core/depth/depth_engine.h"
 #include "pipeline/core/depth/depth_stage.h"
@@ -31,11 +31,10 @@
 #include "pipeline/core/run/recorded_notes.h"
 #include "pipeline/core/run/run_log.h"
 #include "pipeline/validate/validate.h"
+#include "stereo/engine.h"
 
 namespace dtr::pipeline {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 SparseScene SparseOf(const CalibratedPhotos& calibrated, const std::vector<View>& views) {
   std::vector<std::string> names;
@@ -116,47 +115,6 @@ void AdviseOn(const std::filesystem::path& folder, DtrSet set, BuildReport& repo
   report.coverage = AdviceLines(advise::Advise(views, options, progress));
 }
 
-// What other processes did of these stages counts as an earlier run's work.
-void AddParts(const std::filesystem::path& work, const std::vector<std::string>& stages,
-              RunLog& log) {
-  const DonePart total = TotalOf(work, stages);
-  log.AddEarlier(total.wall_s, total.cpu_s);
-}
-
-// Cameras: worked out, or, for what comes after them, as they were frozen.
-CalibratedPhotos CamerasOf(const capture::Capture& photos, const CalibrateOptions& calibrate,
-                           const BuildShare& share, const std::filesystem::path& work,
-                           Progress& progress) {
-  const bool is_later = share.is_shared() && !calibrate.part;
-  if (is_later || share.Is("ranges")) return FrozenCalibration(work);
-  CalibratedPhotos calibrated = CalibratePhotos(photos, calibrate, work / "calibration", progress);
-  if (calibrate.part) {  // given cameras with their points need none of it
-    MarkBegun(work);
-    throw PartDone();
-  }
-  if (share.Is("calibration")) FreezeCalibration(calibrated, work);
-  share.EndAfter("calibration");
-  return calibrated;
-}
-
-CalibrateOptions CalibrateOptionsFor(const BuildOptions& options, const BuildInputs& inputs,
-                                     double memory_gb, const BuildShare& share) {
-  CalibrateOptions calibrate;
-  calibrate.poses = options.poses;
-  calibrate.poses_format = options.poses_format;
-  calibrate.held_out = inputs.held_out;
-  calibrate.strict = options.holdout_strict;
-  calibrate.seed = options.seed;
-  calibrate.memory_gb = memory_gb;
-  calibrate.refine = options.refine;
-  calibrate.refine_poses = options.refine_poses;
-  calibrate.rig = inputs.rig;
-  calibrate.metres = options.metres;
-  calibrate.sfm = options.sfm;
-  calibrate.part = share.Sfm();
-  return calibrate;
-}
-
 void ReportCalibration(const CalibratedPhotos& calibrated, const BuildInputs& inputs,
                        BuildReport& report) {
   report.not_registered = calibrated.not_registered;
@@ -193,128 +151,304 @@ void RequireImages(std::vector<View>& views, const io::SetWriter& writer) {
   }
 }
 
-BuildReport BuildOrPart(const BuildOptions& options, Progress& listener) {
-  const stereo::QualitySettings quality = QualityOf(options.depth);
-  RequireEngine(options.depth);
-  RequireOptions(options);
-  std::optional<SetRig> rig;
-  if (!options.rig.empty()) rig = ReadSetRig(options.rig);
-  const double memory_gb = options.depth.memory_gb.value_or(kDefaultMemoryGb);
-  BuildReport report;
-  BuildShare share(options);
-  RunLog log;
-  RecordedNotes progress(listener);
-
-  RequireCalibration(options.poses, options.poses_format, options.sfm);
-  io::SetWriter::RequireTarget(options.output, options.force);
-  log.Begin("capture");
-  BuildInputs inputs = LookAtInputs(options, std::move(rig), memory_gb, progress);
-  const Json fingerprint = FingerprintOf(options, quality, inputs, memory_gb);
-  const std::string before_depth = BeforeDepth(options, fingerprint).dump();
-  if (!options.part) io::HandOver(options.output, before_depth, fingerprint.dump());
-  io::SetWriter writer = share.OpenWriter(options, fingerprint.dump());
-  share.Lock(writer.work_folder());
-  if (!options.force_stage.empty()) ForgetStage(writer.folder(), options.force_stage);
-  if (inputs.is_derived) {
-    DerivePhotos(options, share.is_shared(), writer, inputs, progress);
-  }
-  const capture::Capture& photos = inputs.photos;
-  const std::vector<bool>& held_out = inputs.held_out;
-  ReportPhotos(photos, report, progress);
-  std::vector<bool> is_source = held_out;
-  is_source.flip();
-
-  log.Begin("calibration");
-  const CalibratedPhotos calibrated =
-      CamerasOf(photos, CalibrateOptionsFor(options, inputs, memory_gb, share), share,
-                writer.work_folder(), progress);
-  log.AddEarlier(calibrated.earlier_wall_s, calibrated.earlier_cpu_s);
-  // Features know what their parts took.
-  AddParts(writer.work_folder(), {"matching", "verification"}, log);
-  ReportCalibration(calibrated, inputs, report);
-
-  log.Begin("undistortion");
-  AddParts(writer.work_folder(), {"undistortion"}, log);
-  DtrSet set;
-  set.unit = calibrated.unit;
-  set.world_origin = calibrated.world_origin;
-  set.frames.resize(1);
-  std::vector<View>& views = set.frames.front().views;
-  RequireTwoSources(photos, held_out, calibrated);
-  views = UndistortPhotos(photos, calibrated, held_out,
-                          {options.max_size_px, memory_gb, share.Undistortion()}, writer, progress);
-  share.EndAfter("undistortion");
-  if (share.is_shared()) RequireImages(views, writer);
-  const SparseScene sparse = SparseOf(calibrated, views);
-
-  log.Begin("depth");
-  AddParts(writer.work_folder(), {"ranges", "search", "pass", "maps"}, log);
-  DepthStageOptions depth_options;
-  depth_options.seed = options.seed;
-  depth_options.photos = PhotoCamerasOf(calibrated, views);
-  depth_options.part = share.Depth();
-  depth_options.keep_work = [&] {
-    io::HandOver(options.output, fingerprint.dump(), before_depth);
-    progress.Note(
-        "cameras and undistorted photos are kept: the same command with another `depth_prior`, or "
-        "none, continues");
-  };
-  const DepthStageResult stage =
-      DepthStage(set, sparse, options.depth, quality, depth_options, writer, progress);
-  report.prior = stage.prior;
-
-  log.Begin("finishing");
-  FinishDepth(options, sparse, memory_gb, writer, set, progress);
-  set.provenance_json = ProvenanceJson(options, OptionsJson(options, stage.quality),
-                                       PhotosJson(photos, is_source), calibrated, report)
-                            .dump();
-  const SetValidation validation =
-      Validate(writer.folder(), set, sparse, memory_gb, report, progress);
-  writer.WriteSparse(set, sparse);
-  WriteSetPage(writer, set,
-               {.name = options.output.stem().string(),
-                .engine = options.depth.engine,
-                .checks = validation.tests,
-                .skipped = report.skipped,
-                .not_registered = report.not_registered.size(),
-                .prior = report.prior,
-                .memory_gb = memory_gb},
-               progress);
-  AdviseOn(writer.folder(), set, report, memory_gb, progress);
-  log.End();
-  std::vector<std::string> lines = progress.lines();
-  lines.insert(lines.end(), report.coverage.begin(), report.coverage.end());
-  io::WriteRunRecord(writer.folder(), log.Record(std::move(lines)),
-                     {{"screening", ScreeningJson(report)}});
-  writer.Finish(set);
-  report.set = std::move(set);
-  report.written = options.output;
-  report.calibration = calibrated.report;
-  report.stages = log.stages();
-  report.peak_memory_mib = static_cast<double>(PeakMemoryBytesWithPrograms()) / (1 << 20);
-  return report;
+void RejectShared(bool given, const char* what) {
+  if (given) throw UsageError(std::string("a build in parts: ") + what);
 }
+
+void RequireShareable(const BuildOptions& options) {
+  RejectShared(options.depth.time_budget_s.has_value(),
+               "`time_budget` measures how much one machine does; give `preset`");
+  RejectShared(options.depth.engine == "colmap" || options.depth.engine == "prior",
+               "expected `engine` patchmatch, sgbm or none");
+  RejectShared(options.depth.prior.given(),
+               "depth priors do not go with it; leave out `depth_prior`");
+  RejectShared(!options.force_stage.empty(),
+               "`force_stage` does not go with it; delete the partial set to begin again");
+}
+
+// The stages of `dtr build`, and what they pass on.
+class StillBuild {
+ public:
+  // `part`: null: the whole.
+  StillBuild(const BuildOptions& options, Progress& listener, const BuildPart* part = nullptr)
+      : options_(options),
+        part_(part),
+        progress_(listener),
+        quality_(QualityOf(options.depth)),
+        memory_gb_(options.depth.memory_gb.value_or(kDefaultMemoryGb)) {}
+
+  std::vector<Stage> Stages() {
+    return {{"capture",
+             [this] { Capture(false); },
+             {"work/capture", "work/frames"},
+             [this] { return std::vector{SfmStep("capture", false, sfm::SfmStage::kPhotos)}; }},
+            {"calibration",
+             [this] { Calibrate({}); },
+             {"work/calibration"},
+             [this] { return CalibrationSteps(); }},
+            {"undistortion",
+             [this] { Undistort({}); },
+             {"images", "mask", "held_out", "work/views"},
+             [this] {
+               return std::vector<Step>{
+                   {{"undistortion", true}, [this](const Part& part) { TakeViews(part); }}};
+             }},
+            {"depth",
+             [this] { FindDepth({}); },
+             {"depth", "sigma", "mesh", "work/planes", "work/estimates", "work/effort.json",
+              "work/colmap"},
+             [this] { return DepthSteps(); }},
+            {"finishing", [this] { Finish(); }}};
+  }
+
+  // Those of all stages that processes can share.
+  std::vector<Step> Steps() {
+    RequireShareable(options_);
+    std::vector<Step> steps;
+    for (const Stage& stage : Stages()) {
+      if (!stage.steps) continue;
+      for (Step& step : stage.steps()) steps.push_back(std::move(step));
+    }
+    return steps;
+  }
+
+  BuildReport Run() {
+    RunStages(Stages(), io::SetWriter::WorkFolderOf(options_.output), log_);
+    return std::move(report_);
+  }
+
+  void RunPart() {
+    const std::vector<Step> steps = Steps();
+    RequirePart(*part_, {steps.begin(), steps.end()});
+    for (const Step& step : steps) {
+      if (step.name != part_->stage) continue;
+      Capture(step.has_parts);
+      step.run(part_->part);
+    }
+  }
+
+ private:
+  Step SfmStep(const char* name, bool has_parts, sfm::SfmStage stage, bool is_counted = false) {
+    return {{name, has_parts},
+            [=, this](const Part& part) {
+              Calibrate(sfm::SfmPart{stage, part});
+              MarkBegun(writer_->work_folder());  // given cameras with points leave nothing
+            },
+            is_counted};
+  }
+
+  std::vector<Step> CalibrationSteps() {
+    using Of = sfm::SfmStage;
+    std::vector<Step> steps;
+    // COLMAP looks for features and matches in a process of its own, all at once.
+    if (options_.sfm.engine != sfm::SfmEngine::kColmap &&
+        NeedsFeatures(options_.poses, options_.poses_format)) {
+      steps = {SfmStep("features", true, Of::kFeatures), SfmStep("pairs", false, Of::kPairs),
+               SfmStep("matching", true, Of::kMatching, true),
+               SfmStep("verification", true, Of::kVerification, true)};
+    }
+    steps.push_back({{"calibration", false},
+                     [this](const Part&) {
+                       Calibrate({});
+                       FreezeCalibration(calibrated_, writer_->work_folder());
+                     },
+                     false});
+    return steps;
+  }
+
+  std::vector<Step> DepthSteps() {
+    if (options_.depth.engine != "patchmatch" && options_.depth.engine != "sgbm") return {};
+    const int passes = stereo::MakeEngine(options_.depth.engine, quality_)->Rounds();
+    std::vector<Step> steps = {{{"ranges", false}, [this](const Part& part) {
+                                  TakeViews({});
+                                  FindDepth(DepthStep{DepthStep::kRanges, part});
+                                }}};
+    for (int pass = passes > 0 ? 0 : 1; pass <= passes + 1; ++pass) {
+      const std::string name = pass > passes ? "maps"
+                               : pass == 0   ? "search"
+                                             : fmt::format("pass-{}", pass);
+      steps.push_back({{name, true}, [this, pass](const Part& part) {
+                         TakeViews({0, 0});
+                         RequireImages(set_.frames.front().views, *writer_);
+                         FindDepth(DepthStep{pass, part});
+                       }});
+    }
+    return steps;
+  }
+
+  void Capture(bool is_shared) {
+    RequireEngine(options_.depth);
+    RequireOptions(options_);
+    std::optional<SetRig> rig;
+    if (!options_.rig.empty()) rig = ReadSetRig(options_.rig);
+    RequireCalibration(options_.poses, options_.poses_format, options_.sfm);
+    io::SetWriter::RequireTarget(options_.output, options_.force);
+    inputs_ = LookAtInputs(options_, std::move(rig), memory_gb_, progress_);
+    const auto fingerprint = FingerprintOf(options_, quality_, inputs_, memory_gb_);
+    before_depth_ = BeforeDepth(options_, fingerprint).dump();
+    fingerprint_ = fingerprint.dump();
+    if (part_ == nullptr) io::HandOver(options_.output, before_depth_, fingerprint_);
+    if (is_shared) {
+      writer_.emplace(io::SetWriter::Join(options_.output, fingerprint_, options_.force));
+    } else {
+      writer_.emplace(options_.output, fingerprint_, options_.force);
+    }
+    if (part_ != nullptr) lock_ = LockPart(writer_->work_folder(), *part_);
+    if (!options_.force_stage.empty()) ForgetStage();
+    if (inputs_.is_derived) DerivePhotos(options_, is_shared, *writer_, inputs_, progress_);
+    ReportPhotos(inputs_.photos, report_, progress_);
+  }
+
+  // Removes what the stage and all after it left, so that the run does them again.
+  void ForgetStage() {
+    const auto stages = Stages();
+    const auto from = std::find_if(stages.begin(), stages.end(), [&](const Stage& stage) {
+      return stage.name == options_.force_stage && !stage.leaves.empty();
+    });
+    if (from == stages.end()) {
+      throw UsageError(fmt::format("`force_stage` {}: expected one of {}", options_.force_stage,
+                                   fmt::join(StagesKept(), ", ")));
+    }
+    // Records of parts, and the cameras frozen for them, would speak of what is gone; then later
+    // stages first: should this be cut off, what is left is the work of an earlier moment.
+    const auto remove = [&](const std::string& path) { RemoveTree(writer_->folder() / path); };
+    for (const char* of_parts : {"work/parts", "work/frozen_cameras"}) remove(of_parts);
+    for (auto stage = stages.end(); stage-- != from;) {
+      for (const std::string& path : stage->leaves) remove(path);
+    }
+  }
+
+  void Calibrate(const std::optional<sfm::SfmPart>& part) {
+    CalibrateOptions calibrate;
+    calibrate.poses = options_.poses;
+    calibrate.poses_format = options_.poses_format;
+    calibrate.held_out = inputs_.held_out;
+    calibrate.strict = options_.holdout_strict;
+    calibrate.seed = options_.seed;
+    calibrate.memory_gb = memory_gb_;
+    calibrate.refine = options_.refine;
+    calibrate.refine_poses = options_.refine_poses;
+    calibrate.rig = inputs_.rig;
+    calibrate.metres = options_.metres;
+    calibrate.sfm = options_.sfm;
+    calibrated_ = CalibratePhotos(inputs_.photos, calibrate, writer_->work_folder() / "calibration",
+                                  progress_, part);
+    log_.AddEarlier(calibrated_.earlier_wall_s, calibrated_.earlier_cpu_s);
+    ReportCalibration(calibrated_, inputs_, report_);
+  }
+
+  // `part`: of the views; the others have no images.
+  void Undistort(const Part& part) {
+    set_.unit = calibrated_.unit;
+    set_.world_origin = calibrated_.world_origin;
+    set_.frames.resize(1);
+    RequireTwoSources(inputs_.photos, inputs_.held_out, calibrated_);
+    set_.frames.front().views =
+        UndistortPhotos(inputs_.photos, calibrated_, inputs_.held_out,
+                        {options_.max_size_px, memory_gb_}, *writer_, progress_, part);
+  }
+
+  // The same with the cameras that the stage before has frozen.
+  void TakeViews(const Part& part) {
+    calibrated_ = FrozenCalibration(writer_->work_folder());
+    Undistort(part);
+  }
+
+  void FindDepth(const std::optional<DepthStep>& step) {
+    sparse_ = SparseOf(calibrated_, set_.frames.front().views);
+    DepthStageOptions depth;
+    depth.seed = options_.seed;
+    depth.photos = PhotoCamerasOf(calibrated_, set_.frames.front().views);
+    depth.keep_work = [&] {
+      io::HandOver(options_.output, fingerprint_, before_depth_);
+      progress_.Note(
+          "cameras and undistorted photos are kept: the same command with another `depth_prior`, "
+          "or none, continues");
+    };
+    const DepthStageResult found =
+        DepthStage(set_, sparse_, options_.depth, quality_, depth, *writer_, progress_, step);
+    report_.prior = found.prior;
+    quality_ = found.quality;
+  }
+
+  void Finish() {
+    FinishDepth(options_, sparse_, memory_gb_, *writer_, set_, progress_);
+    std::vector<bool> is_source = inputs_.held_out;
+    is_source.flip();
+    set_.provenance_json =
+        ProvenanceJson(options_, OptionsJson(options_, quality_),
+                       PhotosJson(inputs_.photos, is_source), calibrated_, report_)
+            .dump();
+    const SetValidation validation =
+        Validate(writer_->folder(), set_, sparse_, memory_gb_, report_, progress_);
+    writer_->WriteSparse(set_, sparse_);
+    WriteSetPage(*writer_, set_,
+                 {.name = options_.output.stem().string(),
+                  .engine = options_.depth.engine,
+                  .checks = validation.tests,
+                  .skipped = report_.skipped,
+                  .not_registered = report_.not_registered.size(),
+                  .prior = report_.prior,
+                  .memory_gb = memory_gb_},
+                 progress_);
+    AdviseOn(writer_->folder(), set_, report_, memory_gb_, progress_);
+    log_.End();
+    std::vector<std::string> lines = progress_.lines();
+    lines.insert(lines.end(), report_.coverage.begin(), report_.coverage.end());
+    io::WriteRunRecord(writer_->folder(), log_.Record(std::move(lines)),
+                       {{"screening", ScreeningJson(report_)}});
+    writer_->Finish(set_);
+    report_.set = std::move(set_);
+    report_.written = options_.output;
+    report_.calibration = calibrated_.report;
+    report_.stages = log_.stages();
+    report_.peak_memory_mib = static_cast<double>(PeakMemoryBytesWithPrograms()) / (1 << 20);
+  }
+
+  const BuildOptions options_;
+  const BuildPart* part_;
+  RecordedNotes progress_;
+  stereo::QualitySettings quality_;
+  const double memory_gb_;
+  RunLog log_;
+  BuildReport report_;
+  BuildInputs inputs_;
+  std::string fingerprint_, before_depth_;
+  std::optional<FileLock> lock_;
+  std::optional<io::SetWriter> writer_;
+  CalibratedPhotos calibrated_;
+  DtrSet set_;
+  SparseScene sparse_;
+};
 
 }  // namespace
 
-BuildReport BuildSet(const BuildOptions& asked, Progress& progress) {
-  const BuildOptions options = ByPreset(asked);
-  if (!options.part) return BuildOrPart(options, progress);
+std::vector<std::string> StagesKept() {
+  SilentProgress silent;
+  std::vector<std::string> names;
+  for (const Stage& stage : StillBuild({}, silent).Stages()) {
+    if (!stage.leaves.empty()) names.push_back(stage.name);
+  }
+  return names;
+}
+
+BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
+  return StillBuild(ByPreset(options), progress).Run();
+}
+
+std::vector<BuildStage> BuildStages(const BuildOptions& options) {
+  SilentProgress silent;
+  const auto steps = StillBuild(ByPreset(options), silent).Steps();
+  return {steps.begin(), steps.end()};
+}
+
+void RunBuildPart(const BuildOptions& options, const BuildPart& part, Progress& progress) {
   const double cpu_start_ms = ProcessCpuMilliseconds();
   const auto start = std::chrono::steady_clock::now();
-  try {
-    BuildOrPart(options, progress);
-    throw std::logic_error(
-        "BuildSet: no stage ended as a part");  // nothing may be recorded as done
-  } catch (const PartDone&) {
-  }
+  StillBuild(ByPreset(options), progress, &part).RunPart();
   const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
-  WriteDonePart(io::SetWriter::WorkFolderOf(options.output), *options.part,
+  WriteDonePart(io::SetWriter::WorkFolderOf(options.output), part,
                 {wall.count(), (ProcessCpuMilliseconds() - cpu_start_ms) / 1e3});
-  BuildReport report;
-  report.part = options.part;
-  report.written = options.output;
-  return report;
 }
 
 }  // namespace dtr::pipeline

@@ -12,7 +12,6 @@
 #include "dtr/base/progress.h"
 #include "dtr/io/set_io.h"
 #include "dtr/types/dtr_set.h"
-#include "pipeline/build/build_part.h"
 #include "pipeline/core/calibration_report.h"
 #include "pipeline/core/depth_settings.h"
 #include "pipeline/core/metres.h"
@@ -23,7 +22,7 @@ namespace dtr::pipeline {
 /// Options of `dtr build`, by the same names.
 struct BuildOptions {
   std::filesystem::path photos;  ///< folder, a video, or a folder of nothing but videos
-  capture::VideoOptions video;   ///< its threads are those below
+  capture::VideoOptions video;
   capture::PanoramaUse panoramas = capture::PanoramaUse::kAuto;  ///< which photos are split
   std::filesystem::path output;                                  ///< NAME.dtr
   std::string holdout;                                           ///< "", "every:N" or names
@@ -40,8 +39,6 @@ struct BuildOptions {
   MetreOptions metres;            ///< places and distances that the refinement holds
   bool force = false;
   std::string force_stage;  ///< of an interrupted run: done again with all after it; "": none
-  /// Does this alone, of a build that others of the same options began or will end (build_part.h).
-  std::optional<BuildPart> part = {};
   std::uint64_t seed = 0;
 };
 
@@ -64,7 +61,6 @@ struct BuildReport {
   std::optional<DepthPriorReport> prior;  ///< where there was one
   std::vector<io::RunStage> stages;       ///< what each cost
   double peak_memory_mib = 0;             ///< with COLMAP's
-  std::optional<BuildPart> part;          ///< what alone was done; all else is empty then
 };
 
 /// JSON object: set, views[].{name,role,width_px,height_px}, not_registered[], why_not_registered,
@@ -78,8 +74,7 @@ std::string ToJson(const BuildReport& report);
 std::vector<std::string> StagesKept();
 
 /// Builds a set. Continues an interrupted run of the same input and options; throws UsageError when
-/// the output exists (without force) or belongs to another run. With options.part the output is not
-/// there yet when it returns.
+/// the output exists (without force) or belongs to another run.
 BuildReport BuildSet(const BuildOptions& options, Progress& progress);
 
 }  // namespace dtr::pipeline

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dtr/base/part.h"
+#include "dtr/base/progress.h"
 
 namespace dtr::pipeline {
 
@@ -20,9 +21,9 @@ struct BuildStage {
   bool has_parts = false;
 };
 
-/// The stages of a build with these options, in their order; what is left after the last of them a
-/// build without BuildOptions::part does, which also does whatever was left out. Throws UsageError
-/// for options with which work cannot be shared.
+/// The stages of a build with these options, in their order; what is left after the last of them
+/// BuildSet does, which also does whatever was left out. Throws UsageError for options with which
+/// work cannot be shared.
 std::vector<BuildStage> BuildStages(const BuildOptions& options);
 
 /// One part of one stage.
@@ -30,6 +31,11 @@ struct BuildPart {
   std::string stage;
   Part part;
 };
+
+/// Does this alone, of a build that others of the same options began or will end; the set is not
+/// there yet when it returns. Throws as BuildSet, UsageError where it is no part of such a build or
+/// another process is at it, Error where a stage before it is not done.
+void RunBuildPart(const BuildOptions& options, const BuildPart& part, Progress& progress);
 
 /// "STAGE" or "STAGE, part 3 of 8".
 std::string NameOf(const BuildPart& part);

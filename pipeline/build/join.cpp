@@ -22,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// A time step of a set: the set at that time, without pixels.
-struct Step {
+struct JoinedStep {
   fs::path folder;
   DtrSet still;
   double time_s = 0;
@@ -43,10 +43,11 @@ nlohmann::json FingerprintOf(const std::vector<fs::path>& sets, const JoinOption
 }
 
 /// How lengths and axes were found: kept where all sets say the same, with one world.
-nlohmann::json ProvenanceOf(const std::vector<Step>& steps, const nlohmann::json& fingerprint) {
+nlohmann::json ProvenanceOf(const std::vector<JoinedStep>& steps,
+                            const nlohmann::json& fingerprint) {
   nlohmann::json provenance{{"joined", fingerprint}};
   std::optional<nlohmann::json> scale;
-  for (const Step& step : steps) {
+  for (const JoinedStep& step : steps) {
     const nlohmann::json own = nlohmann::json::parse(step.still.provenance_json, nullptr, false);
     if (!own.is_object() || !own.contains("scale")) return provenance;
     if (scale && *scale != own["scale"]) return provenance;
@@ -69,8 +70,8 @@ void MoveTo(const Eigen::Vector3d& origin, DtrSet& set) {
 }
 
 /// The time steps of all sets, in order.
-std::vector<Step> StepsOf(const std::vector<fs::path>& sets, double frames_per_second) {
-  std::vector<Step> steps;
+std::vector<JoinedStep> StepsOf(const std::vector<fs::path>& sets, double frames_per_second) {
+  std::vector<JoinedStep> steps;
   LengthUnit unit{};
   double next_s = 0;  // when the next set begins
   for (const fs::path& folder : sets) {
@@ -112,7 +113,7 @@ View Joined(const View& view, size_t index, bool is_of_dynamic) {
 }
 
 /// Views of a time step, without their meshes.
-Frame WriteViews(const Step& step, size_t index, const io::LoadOptions& load, LengthUnit unit,
+Frame WriteViews(const JoinedStep& step, size_t index, const io::LoadOptions& load, LengthUnit unit,
                  io::SetWriter& writer, const Progress& progress) {
   Frame frame;
   frame.time_s = step.time_s;
@@ -137,7 +138,7 @@ Frame WriteViews(const Step& step, size_t index, const io::LoadOptions& load, Le
 }
 
 /// Of every view that has one. After depth has its last files, which a mesh names.
-void WriteMeshes(const std::vector<Step>& steps, io::LoadOptions load, io::SetWriter& writer,
+void WriteMeshes(const std::vector<JoinedStep>& steps, io::LoadOptions load, io::SetWriter& writer,
                  DtrSet& moving, Progress& progress) {
   progress.Stage("meshes", static_cast<int>(steps.size()));
   load.images = load.sigma = load.held_out = false;  // a mesh is of completed depth, too
@@ -160,7 +161,7 @@ size_t JoinSets(const std::vector<fs::path>& sets, const fs::path& target,
                 const JoinOptions& options, Progress& progress) {
   if (sets.size() < 2) throw UsageError("join: expected two sets or more, in order of time");
   if (options.video) io::RequireVideoEncoder();
-  std::vector<Step> steps = StepsOf(sets, options.frames_per_second);
+  std::vector<JoinedStep> steps = StepsOf(sets, options.frames_per_second);
   const nlohmann::json fingerprint = FingerprintOf(sets, options);
   io::SetWriter writer(target, fingerprint.dump(), options.force);
   DtrSet moving;

@@ -43,8 +43,6 @@ struct CalibrateOptions {
   bool fixed_intrinsics = false;  ///< the model's are to be held; CalibratePhotos sets it
   std::string advice =
       {};  ///< what helps where cameras are not determined; CalibratePhotos sets it
-  /// A part of structure from motion: CalibratePhotos does this alone and throws PartDone.
-  std::optional<sfm::SfmPart> part = {};
 };
 
 /// Calibrated photos, frozen: everything later depends on this model alone.
@@ -88,8 +86,10 @@ int FeatureImageSizePx(const std::vector<std::pair<int, int>>& sizes_px, double 
                        int asked_px = 0);
 
 /// Calibrates the photos. `workspace` keeps checkpoints: the same input and options continue there,
-/// and a finished calibration is read back instead of computed again.
+/// and a finished calibration is read back instead of computed again. With `part` only this part of
+/// structure from motion is done, for one of several processes, and the result is empty.
 CalibratedPhotos CalibratePhotos(const capture::Capture& capture, const CalibrateOptions& options,
-                                 const std::filesystem::path& workspace, Progress& progress);
+                                 const std::filesystem::path& workspace, Progress& progress,
+                                 const std::optional<sfm::SfmPart>& part = {});
 
 }  // namespace dtr::pipeline

@@ -22,6 +22,7 @@
 #include "dtr/render/time_steps.h"
 #include "pipeline/build/detail/build_json.h"
 #include "pipeline/build/detail/build_options.h"
+#include "pipeline/build/detail/stages.h"
 #include "pipeline/core/depth/depth_engine.h"
 #include "pipeline/core/photos/holdout.h"
 #include "pipeline/core/photos/input_hash.h"
@@ -210,80 +211,95 @@ BuildReport BuildDynamicSet(const BuildOptions& asked, const DynamicOptions& dyn
   BuildReport report;
   RunLog log;
   RecordedNotes progress(listener);
-  log.Begin("capture");
-  Recording recording(options.photos,
-                      {std::max(1, options.video.every), dynamic.from, dynamic.to, dynamic.fps,
-                       dynamic.free_clocks},
+  std::optional<Recording> recording;
+  std::vector<bool> held_out;
+  Json files;
+  std::optional<io::SetWriter> writer;
+  const auto capture = [&] {
+    recording.emplace(options.photos,
+                      StepChoice{std::max(1, options.video.every), dynamic.from, dynamic.to,
+                                 dynamic.fps, dynamic.free_clocks},
                       progress);
-  const std::vector<bool> held_out = ChooseHeldOut(options.holdout, recording.cameras());
-  if (fixed.rig) RequireRigCameras(*fixed.rig, recording, progress);
-  const Json files = FilesJson(recording, options.photos);
-  Json dynamic_json = DynamicJson(recording, options, dynamic, temporal);
-  Json fingerprint = {{"tool_version", DTR_VERSION},
-                      {"options", OptionsJson(options, quality)},
-                      {"dynamic", dynamic_json},
-                      {"files", files}};
-  if (!options.rig.empty()) fingerprint["rig_sha256"] = InputHash(options.rig);
-  io::SetWriter writer(options.output, fingerprint.dump(), options.force);
+    held_out = ChooseHeldOut(options.holdout, recording->cameras());
+    if (fixed.rig) RequireRigCameras(*fixed.rig, *recording, progress);
+    files = FilesJson(*recording, options.photos);
+    Json fingerprint = {{"tool_version", DTR_VERSION},
+                        {"options", OptionsJson(options, quality)},
+                        {"dynamic", DynamicJson(*recording, options, dynamic, temporal)},
+                        {"files", files}};
+    if (!options.rig.empty()) fingerprint["rig_sha256"] = InputHash(options.rig);
+    writer.emplace(options.output, fingerprint.dump(), options.force);
+  };
 
-  log.Begin("calibration");
-  fixed.calibrate.held_out = held_out;
-  fixed.calibrate.seed = options.seed;
-  fixed.calibrate.memory_gb = memory_gb;
-  fixed.calibrate.refine = options.refine;
-  fixed.calibrate.sfm = options.sfm;
-  fixed.max_size_px = options.max_size_px;
-  fixed.free_clocks = dynamic.free_clocks;
-  const FixedCameras cameras =
-      CalibrateFixedCameras(recording, fixed, writer.work_folder() / "calibration", progress);
-  log.AddEarlier(cameras.calibrated.earlier_wall_s, cameras.calibrated.earlier_cpu_s);
+  FixedCameras cameras;
+  const auto calibrate = [&] {
+    fixed.calibrate.held_out = held_out;
+    fixed.calibrate.seed = options.seed;
+    fixed.calibrate.memory_gb = memory_gb;
+    fixed.calibrate.refine = options.refine;
+    fixed.calibrate.sfm = options.sfm;
+    fixed.max_size_px = options.max_size_px;
+    fixed.free_clocks = dynamic.free_clocks;
+    cameras =
+        CalibrateFixedCameras(*recording, fixed, writer->work_folder() / "calibration", progress);
+    log.AddEarlier(cameras.calibrated.earlier_wall_s, cameras.calibrated.earlier_cpu_s);
+  };
 
-  log.Begin("undistortion");
   DtrSet set;
-  set.unit = cameras.calibrated.unit;
-  set.world_origin = cameras.calibrated.world_origin;
-  WriteImages(recording, cameras, held_out, options, set.unit, writer, set.frames, progress);
+  const auto undistort = [&] {
+    set.unit = cameras.calibrated.unit;
+    set.world_origin = cameras.calibrated.world_origin;
+    WriteImages(*recording, cameras, held_out, options, set.unit, *writer, set.frames, progress);
+  };
 
-  log.Begin("depth");
-  std::optional<BackgroundViews> backgrounds = ComputeStepDepths(
-      set, cameras.all_points, {options.depth, quality, temporal, options.seed}, writer, progress);
+  std::optional<BackgroundViews> backgrounds;
+  const auto find_depth = [&] {
+    backgrounds =
+        ComputeStepDepths(set, cameras.all_points, {options.depth, quality, temporal, options.seed},
+                          *writer, progress);
+  };
 
-  log.Begin("finishing");
-  FinishViews(cameras.sparse, options, memory_gb, std::move(backgrounds), writer, set, progress);
-  if (dynamic.video) {
-    io::StoreCameraVideos(writer.folder(), writer.work_folder(), set, *dynamic.video, memory_gb,
-                          progress);
-  }
-  Json provenance =
-      ProvenanceJson(options, OptionsJson(options, quality), files, cameras.calibrated, report);
-  if (dynamic.free_clocks) {
-    dynamic_json = DynamicJson(recording, options, dynamic, temporal);
-    dynamic_json["found_clocks"] = ClocksJson(recording, cameras.clocks);
-  }
-  provenance["dynamic"] = dynamic_json;
-  set.provenance_json = provenance.dump();
-  writer.WriteSparse(set, cameras.sparse);
-  DtrSet first = AtFrame(set, 0);
-  SetLimits limits;
-  limits.memory_gb = std::min(limits.memory_gb, memory_gb);
-  const SetValidation validation =
-      ValidateSet(writer.folder(), first, cameras.sparse, limits, progress);
-  report.validated = true;
-  report.validation_passed = validation.passed();
-  set.validation_json = eval::ValidationJson(validation.tests);
-  if (!report.validation_passed) progress.Note(io::ValidationWarning(set));
-  WriteSetPage(writer, first,
-               {.name = options.output.stem().string(),
-                .engine = options.depth.engine,
-                .checks = validation.tests,
-                .skipped = {},
-                .not_registered = 0,
-                .prior = {},
-                .memory_gb = memory_gb},
-               progress);
-  log.End();
-  io::WriteRunRecord(writer.folder(), log.Record(progress.lines()), {});
-  writer.Finish(set);
+  const auto finish = [&] {
+    FinishViews(cameras.sparse, options, memory_gb, std::move(backgrounds), *writer, set, progress);
+    if (dynamic.video) {
+      io::StoreCameraVideos(writer->folder(), writer->work_folder(), set, *dynamic.video, memory_gb,
+                            progress);
+    }
+    Json provenance =
+        ProvenanceJson(options, OptionsJson(options, quality), files, cameras.calibrated, report);
+    Json& json = provenance["dynamic"] = DynamicJson(*recording, options, dynamic, temporal);
+    if (dynamic.free_clocks) json["found_clocks"] = ClocksJson(*recording, cameras.clocks);
+    set.provenance_json = provenance.dump();
+    writer->WriteSparse(set, cameras.sparse);
+    DtrSet first = AtFrame(set, 0);
+    SetLimits limits;
+    limits.memory_gb = std::min(limits.memory_gb, memory_gb);
+    const SetValidation validation =
+        ValidateSet(writer->folder(), first, cameras.sparse, limits, progress);
+    report.validated = true;
+    report.validation_passed = validation.passed();
+    set.validation_json = eval::ValidationJson(validation.tests);
+    if (!report.validation_passed) progress.Note(io::ValidationWarning(set));
+    WriteSetPage(*writer, first,
+                 {.name = options.output.stem().string(),
+                  .engine = options.depth.engine,
+                  .checks = validation.tests,
+                  .skipped = {},
+                  .not_registered = 0,
+                  .prior = {},
+                  .memory_gb = memory_gb},
+                 progress);
+    log.End();
+    io::WriteRunRecord(writer->folder(), log.Record(progress.lines()), {});
+    writer->Finish(set);
+  };
+
+  RunStages({{"capture", capture},
+             {"calibration", calibrate},
+             {"undistortion", undistort},
+             {"depth", find_depth},
+             {"finishing", finish}},
+            io::SetWriter::WorkFolderOf(options.output), log);
   report.set = std::move(set);
   report.written = options.output;
   report.calibration = cameras.calibrated.report;

@@ -143,10 +143,10 @@ std::string NameOf(const std::optional<MatchPart>& part) {
 // The pairs to be matched: chosen now, unless that was done before.
 std::vector<std::pair<int, int>> PairsOf(PairJournal::Content& kept,
                                          std::span<const MatchPhoto> photos,
-                                         const MatchOptions& options, PairJournal& journal,
-                                         Progress& progress) {
+                                         const MatchOptions& options, bool may_choose,
+                                         PairJournal& journal, Progress& progress) {
   if (!kept.pairs) {
-    if (options.part && options.part->stage != MatchPart::Stage::kPairs) {
+    if (!may_choose) {
       throw Error(
           "matches: expected pairs of photos that were chosen, found none; run the stage pairs "
           "first");
@@ -159,19 +159,21 @@ std::vector<std::pair<int, int>> PairsOf(PairJournal::Content& kept,
   return std::move(*kept.pairs);
 }
 
-PairJournal JournalOf(std::span<const MatchPhoto> photos, const MatchOptions& options) {
+PairJournal JournalOf(std::span<const MatchPhoto> photos, const MatchOptions& options,
+                      const std::optional<MatchPart>& part) {
   if (options.journal.empty()) return {};
   std::vector<size_t> counts;
   for (const MatchPhoto& photo : photos) counts.push_back(photo.features.keypoints.size());
-  const bool is_matching = options.part && options.part->stage == MatchPart::Stage::kMatching;
-  return {options.journal, options.journal_inputs, counts, NameOf(options.part), !is_matching};
+  const bool is_matching = part && part->stage == MatchPart::Stage::kMatching;
+  return {options.journal, options.journal_inputs, counts, NameOf(part), !is_matching};
 }
 
 }  // namespace
 
 MatchResult MatchPhotos(std::span<const MatchPhoto> photos,
                         std::span<const calib::LensCamera> cameras,
-                        const std::vector<bool>& focal_is_known, const MatchOptions& options) {
+                        const std::vector<bool>& focal_is_known, const MatchOptions& options,
+                        const std::optional<MatchPart>& part) {
   Check(photos, cameras, focal_is_known, options.load_descriptors != nullptr);
   SilentProgress silent;
   Progress& progress = options.progress != nullptr ? *options.progress : silent;
@@ -184,16 +186,16 @@ MatchResult MatchPhotos(std::span<const MatchPhoto> photos,
     for (const Keypoint& k : photo.features.keypoints) image.pixels.emplace_back(k.x_px, k.y_px);
     graph.images.push_back(std::move(image));
   }
-  PairJournal journal = JournalOf(photos, options);
-  PairJournal::Content kept = journal.TakeContent();
-  const auto pairs = PairsOf(kept, photos, options, journal, progress);
   using Stage = MatchPart::Stage;
-  if (options.part && options.part->stage == Stage::kPairs) throw PartDone();
-  const Part part = options.part ? options.part->part : Part{};
-  if (!options.part || options.part->stage == Stage::kMatching) {
-    CoarseSearch(photos, pairs, part, options, journal, progress, kept.coarse);
-    if (options.part) throw PartDone();
+  const auto does = [&](Stage stage) { return !part || part->stage == stage; };
+  const Part share = part ? part->part : Part{};
+  PairJournal journal = JournalOf(photos, options, part);
+  PairJournal::Content kept = journal.TakeContent();
+  const auto pairs = PairsOf(kept, photos, options, does(Stage::kPairs), journal, progress);
+  if (does(Stage::kMatching)) {
+    CoarseSearch(photos, pairs, share, options, journal, progress, kept.coarse);
   }
+  if (!does(Stage::kVerification)) return result;
   std::vector<CoarsePair> coarse = AllOf(std::move(kept.coarse));
   const Overlay overlay = FindOverlay(photos, cameras, coarse);
   RemoveOverlay(overlay, coarse);
@@ -202,8 +204,8 @@ MatchResult MatchPhotos(std::span<const MatchPhoto> photos,
     if (options.lens_is_known[c]) graph.focal_is_known[c] = true;
   }
   VoteOnCameras(photos, coarse, options, graph, result.notes);
-  Verify(photos, pairs, coarse, overlay, graph, part, options, journal, progress, kept.geometries);
-  if (options.part) throw PartDone();
+  Verify(photos, pairs, coarse, overlay, graph, share, options, journal, progress, kept.geometries);
+  if (part) return result;
   for (auto& pair : kept.geometries) {
     if (pair->geometry) graph.pairs.push_back(std::move(*pair->geometry));
   }

@@ -24,7 +24,7 @@ struct MatchPhoto {
   Features features;
 };
 
-/// What of the work one of several processes does; all of them share a journal.
+/// A part of the work, for one of several processes that share a journal.
 struct MatchPart {
   enum class Stage {
     kPairs,         ///< which pairs are matched; the first, by one process
@@ -52,8 +52,6 @@ struct MatchOptions {
   /// result depends on) to go on with. Empty: nothing is kept.
   std::filesystem::path journal = {};
   std::string journal_inputs = {};
-  /// Does this alone and throws PartDone; needs a journal. Empty: everything.
-  std::optional<MatchPart> part = {};
   Progress* progress = nullptr;
 };
 
@@ -74,9 +72,11 @@ struct MatchResult {
 /// Deterministic: the same bytes for any number of threads. Photos without features get no pairs.
 /// Throws std::invalid_argument when numbers of things that belong together differ or an index is
 /// out of range, Interrupted when `progress` says so, Error where the journal cannot be written or
-/// does not hold what a part needs.
+/// does not hold what a part needs. With `part` only this is done, into the journal, which a call
+/// without one then goes on with; the result is not whole.
 MatchResult MatchPhotos(std::span<const MatchPhoto> photos,
                         std::span<const calib::LensCamera> cameras,
-                        const std::vector<bool>& focal_is_known, const MatchOptions& options);
+                        const std::vector<bool>& focal_is_known, const MatchOptions& options,
+                        const std::optional<MatchPart>& part = {});
 
 }  // namespace dtr::sfm

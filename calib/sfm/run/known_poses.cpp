@@ -177,14 +177,14 @@ std::vector<calib::MatchedPair> MatchWithoutCameras(const fs::path& images_dir,
   Workspace workspace(workspace_folder, images_dir, inputs, "", progress, VersionOf(options),
                       options.folder_is_shared);
   SfmReport report;
-  FeaturesAndMatches(workspace, GroupCameras(workspace.images(), CameraModelOf(options), true),
+  FeaturesAndMatches(workspace, {GroupCameras(workspace.images(), CameraModelOf(options), true)},
                      options, report);
   return MatchesIn(workspace);
 }
 
 SfmResult TriangulateWithPoses(const fs::path& images_dir, std::span<const PosedImage> images,
                                const fs::path& workspace_folder, const SfmOptions& options,
-                               Progress& progress) {
+                               Progress& progress, const std::optional<SfmPart>& part) {
   if (images.size() < 2) {
     throw UsageError(fmt::format("{}: expected at least two photos with poses, found {}",
                                  images_dir.string(), images.size()));
@@ -193,12 +193,13 @@ SfmResult TriangulateWithPoses(const fs::path& images_dir, std::span<const Posed
   const KnownCameras known = Arranged(images);
   Workspace workspace(workspace_folder, images_dir, InputsOf(known.images), "", progress,
                       VersionOf(options), options.folder_is_shared);
-  if (options.part && options.part->stage == SfmStage::kPhotos) throw PartDone();
   SfmResult result;
   // Where no pair could overlap the cameras are doubtful: the photos themselves are asked then.
   const ImagePairs pairs = PairsThatMayOverlap(known.images);
-  FeaturesAndMatches(workspace, known.groups, options, result.report,
-                     pairs.empty() ? std::nullopt : std::optional(pairs), true);
+  FeaturesAndMatches(workspace,
+                     {known.groups, pairs.empty() ? std::nullopt : std::optional(pairs), true},
+                     options, result.report, part);
+  if (part) return result;
   std::string inputs = TextOf(known) + fmt::format("seed {}", options.seed);
   workspace.Step("triangulation", inputs, [&] { TriangulationStep(workspace, known, options); });
   result.model = options.colmap->ReadModel(workspace.folder() / "model");

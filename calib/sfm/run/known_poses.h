@@ -26,11 +26,11 @@ void RequireMatches(size_t pairs, size_t photos);
 /// all images, in order of names. Workspace, checkpoints and errors as in RunSfm;
 /// options.lens_model and share_intrinsics_within_group have no say here. Throws Error also when
 /// COLMAP moved a camera by more than 1e-9 (colmap/triangulator.cpp). A report that lists
-/// not_registered names photos without any point.
+/// not_registered names photos without any point. `part`: as RunSfm's.
 SfmResult TriangulateWithPoses(const std::filesystem::path& images_dir,
                                std::span<const PosedImage> images,
                                const std::filesystem::path& workspace, const SfmOptions& options,
-                               Progress& progress);
+                               Progress& progress, const std::optional<SfmPart>& part = {});
 
 /// Matches of photos whose cameras are not believed: features and matching by calib/sfm in
 /// `workspace`, focal lengths by a vote. Indices into `images`, whose priors play no part. Throws

@@ -229,7 +229,7 @@ void OwnFeatures(Workspace& workspace, const std::vector<CameraGroup>& groups,
     const fs::path file =
         fmt::format("{}{}_of_{}", all.string() + kPart, part->part.index, part->part.count);
     AddInBatches(workspace, file, own, KeptOrNew(workspace, file), plan, detect);
-    throw PartDone();
+    return;
   }
   if (part && part->stage != SfmStage::kPairs) {
     throw Error("features: expected those of all photos, found none; run the stage pairs first");
@@ -246,11 +246,11 @@ void OwnFeatures(Workspace& workspace, const std::vector<CameraGroup>& groups,
   for (const fs::path& file : files) RemoveTree(file);
 }
 
-void OwnMatches(Workspace& workspace, const std::vector<CameraGroup>& groups, Matching matching,
-                const SfmOptions& options, bool known_lenses,
-                const std::optional<ImagePairs>& allowed) {
+void OwnMatches(Workspace& workspace, const PhotosToMatch& to_match, Matching matching,
+                const SfmOptions& options, const std::optional<SfmPart>& part) {
   const FeatureFile features(workspace.folder() / kFeatureFile);
-  GroupLenses known = LensesOf(workspace, groups);
+  const std::vector<CameraGroup>& groups = to_match.groups;
+  const GroupLenses known = LensesOf(workspace, groups);
   std::vector<MatchPhoto> photos;
   std::vector<int> group_of(workspace.images().size());
   for (size_t g = 0; g < groups.size(); ++g) {
@@ -263,8 +263,8 @@ void OwnMatches(Workspace& workspace, const std::vector<CameraGroup>& groups, Ma
   }
   MatchOptions match;
   match.seed = options.seed;
-  match.lens_is_known.assign(known.lenses.size(), known_lenses);
-  match.pairs = PairsFor(workspace.images(), matching, allowed);
+  match.lens_is_known.assign(known.lenses.size(), to_match.known_lenses);
+  match.pairs = PairsFor(workspace.images(), matching, to_match.allowed);
   match.preselect = matching == Matching::kPreselected;
   match.load_descriptors = [&](int photo, size_t first) {
     return features.DescriptorsOf(static_cast<size_t>(photo), first);
@@ -272,8 +272,11 @@ void OwnMatches(Workspace& workspace, const std::vector<CameraGroup>& groups, Ma
   match.descriptor_gb = kDescriptorShare * options.memory_gb;
   match.journal = workspace.folder() / "matches.begun";
   match.journal_inputs = workspace.fingerprint();
-  if (options.part) match.part = MatchPartOf(*options.part);
   match.progress = &workspace.progress();
+  if (part) {
+    MatchPhotos(photos, known.lenses, known.focal_is_known, match, MatchPartOf(*part));
+    return;
+  }
   workspace.RunHere([&] {
     MatchResult result = MatchPhotos(photos, known.lenses, known.focal_is_known, match);
     for (const std::string& note : result.notes) workspace.progress().Note(note);

@@ -7,7 +7,7 @@
 
 #include "calib/sfm/run/feature_plan.h"
 #include "calib/sfm/run/match_summary.h"
-#include "calib/sfm/run/workspace.h"
+#include "calib/sfm/run/sfm_steps.h"
 #include "calib/sfm/view_graph.h"
 
 namespace dtr::sfm {
@@ -32,17 +32,15 @@ inline constexpr char kStoreVersion[] = "\nstore 1";
 /// Features of all photos into the workspace's kFeatureFile (store.h), batch by batch: an
 /// interrupted step of the same fingerprint goes on after the last of them. Features that a process
 /// with a part has found are taken over. `part`: of kFeatures, those of a part of the photos into a
-/// file of its own, and PartDone; a later stage needs the file of all and throws Error.
+/// file of its own; a later one than kPairs needs the file of all and throws Error.
 void OwnFeatures(Workspace& workspace, const std::vector<CameraGroup>& groups,
                  const ExtractionPlan& plan, const std::optional<SfmPart>& part);
 
-/// Matches of these features into the workspace's kMatchFile, with the lenses that they determine.
-/// `known_lenses`: intrinsics are given and hold; else focal lengths and distortion are estimated.
-/// Of the pairs that `matching` names only those of `allowed`, where it is given. With options.part
-/// only that, and PartDone.
-void OwnMatches(Workspace& workspace, const std::vector<CameraGroup>& groups, Matching matching,
-                const SfmOptions& options, bool known_lenses,
-                const std::optional<ImagePairs>& allowed);
+/// Matches of these features into the workspace's kMatchFile, with the lenses that they determine:
+/// those of `photos` where they are known, else focal lengths and distortion are estimated. With
+/// `part` only this, into a journal.
+void OwnMatches(Workspace& workspace, const PhotosToMatch& photos, Matching matching,
+                const SfmOptions& options, const std::optional<SfmPart>& part);
 
 /// The graph that OwnMatches left, images in the workspace's order under their own names. Throws
 /// Error where the store is damaged.

@@ -92,7 +92,8 @@ std::vector<int> ModelSizes(const Workspace& workspace) {
 }  // namespace
 
 SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> images,
-                 const fs::path& workspace_folder, const SfmOptions& options, Progress& progress) {
+                 const fs::path& workspace_folder, const SfmOptions& options, Progress& progress,
+                 const std::optional<SfmPart>& part) {
   const calib::CameraModel lens = CameraModelOf(options);
   if (images.size() < 2) {
     throw UsageError(
@@ -102,10 +103,11 @@ SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> imag
   }
   Workspace workspace(workspace_folder, images_dir, images, "", progress, VersionOf(options),
                       options.folder_is_shared);
-  if (options.part && options.part->stage == SfmStage::kPhotos) throw PartDone();
   const auto groups = GroupCameras(workspace.images(), lens, options.share_intrinsics_within_group);
   SfmResult result;
-  FeaturesAndMatches(workspace, groups, options, result.report, {}, options.intrinsics_are_known);
+  FeaturesAndMatches(workspace, {groups, {}, options.intrinsics_are_known}, options, result.report,
+                     part);
+  if (part) return result;
   workspace.Step("mapping", MappingInputs(options),
                  [&] { MappingStep(workspace, groups, options); });
   result.model = options.colmap->ReadModel(workspace.folder() / "model");
@@ -180,7 +182,7 @@ std::optional<SfmResult> MapWithFixedIntrinsics(const fs::path& images_dir,
                                    options.share_intrinsics_within_group);
   if (!AllHavePriors(groups)) return {};
   SfmResult result;
-  FeaturesAndMatches(workspace, groups, options, result.report);
+  FeaturesAndMatches(workspace, {groups}, options, result.report);
   workspace.Step("mapping", MappingInputs(options),
                  [&] { MappingStep(workspace, groups, options); });
   workspace.Step("fixed mapping", MappingInputs(options),

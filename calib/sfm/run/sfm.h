@@ -102,8 +102,6 @@ struct SfmOptions {
   /// Other processes work in the folder, which one that was alone has made: nothing of theirs is
   /// touched, and photos that have their size and time count as what they were.
   bool folder_is_shared = false;
-  /// Does this alone and throws PartDone; with kGlobal and kAuto. Empty: everything.
-  std::optional<SfmPart> part = {};
 };
 
 /// "auto", "exhaustive", "preselected", "sequential".
@@ -157,10 +155,11 @@ struct SfmResult {
 ///
 /// Throws UsageError on inputs that cannot be meant (fewer than two photos, names twice, an unknown
 /// lens model), Interrupted when asked to stop (the program is ended), Error when COLMAP is
-/// missing, fails (naming step, cause and log) or makes no model.
+/// missing, fails (naming step, cause and log) or makes no model. With `part` (of kGlobal and
+/// kAuto) only this is done and the result is empty; a call without one goes on with all of them.
 SfmResult RunSfm(const std::filesystem::path& images_dir, std::span<const SfmImageInput> images,
                  const std::filesystem::path& workspace, const SfmOptions& options,
-                 Progress& progress);
+                 Progress& progress, const std::optional<SfmPart>& part = {});
 
 /// Where RunSfm of the same arguments has finished, maps its matches again with focal lengths fixed
 /// at the priors and no distortion, in `workspace`/fixed, with checkpoints as RunSfm's. Empty where

@@ -45,9 +45,10 @@ MatchSummary MatchedIn(const Workspace& workspace, const SfmOptions& options) {
                                               : SummaryOf(workspace);
 }
 
-void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& groups,
+void FeaturesAndMatches(Workspace& workspace, const PhotosToMatch& photos,
                         const SfmOptions& options, SfmReport& report,
-                        const std::optional<ImagePairs>& allowed, bool known_lenses) {
+                        const std::optional<SfmPart>& part) {
+  if (part && part->stage == SfmStage::kPhotos) return;  // the workspace has them
   ExtractionPlan plan =
       PlanExtraction(workspace.images(), options.memory_gb, options.max_image_size_px);
   plan.max_features = options.max_features;
@@ -56,25 +57,28 @@ void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& gr
   report.matching = ResolveMatching(options.matching, workspace.images().size());
 
   const bool by_colmap = options.engine == SfmEngine::kColmap;
-  std::string inputs = TextOf(groups, plan, options.seed);
+  const bool features_alone = part && part->stage == SfmStage::kFeatures;
+  std::string inputs = TextOf(photos.groups, plan, options.seed);
   if (!by_colmap) inputs += kStoreVersion;
-  workspace.Step("features", inputs, [&] {
-    by_colmap ? options.colmap->Extract(workspace, groups, plan, options.seed)
-              : OwnFeatures(workspace, groups, plan, options.part);
-  });
-  if (options.part && options.part->stage == SfmStage::kFeatures) throw PartDone();
+  const auto find = [&] {
+    by_colmap ? options.colmap->Extract(workspace, photos.groups, plan, options.seed)
+              : OwnFeatures(workspace, photos.groups, plan, part);
+  };
+  workspace.Step("features", inputs, find, features_alone);
+  if (features_alone) return;
   auto text = fmt::format("matching {} seed {}", static_cast<int>(report.matching), options.seed);
-  if (known_lenses && !by_colmap) text += " known lenses";
+  if (photos.known_lenses && !by_colmap) text += " known lenses";
   for (const SfmImageInput& image : workspace.images()) {
     if (!image.station.empty()) text += " " + image.station;
   }
-  if (allowed) {
-    for (const auto& [a, b] : *allowed) text += fmt::format(" {}-{}", a, b);
+  if (photos.allowed) {
+    for (const auto& [a, b] : *photos.allowed) text += fmt::format(" {}-{}", a, b);
   }
-  workspace.Step("matches", text, [&] {
-    by_colmap ? options.colmap->Match(workspace, report.matching, options, allowed)
-              : OwnMatches(workspace, groups, report.matching, options, known_lenses, allowed);
-  });
+  const auto match = [&] {
+    by_colmap ? options.colmap->Match(workspace, report.matching, options, photos.allowed)
+              : OwnMatches(workspace, photos, report.matching, options, part);
+  };
+  workspace.Step("matches", text, match, part.has_value());
 }
 
 void CompleteReport(const Workspace& workspace, const calib::SfmModel& model, SfmReport& report) {

@@ -21,13 +21,20 @@ std::string VersionOf(const SfmOptions& options);
 /// What matching found, by whatever engine.
 MatchSummary MatchedIn(const Workspace& workspace, const SfmOptions& options);
 
-/// Steps "features" and "matches" of the workspace. What was planned goes to `report`.
-/// Of the pairs that options.matching names only those of `allowed` (a < b, sorted; numbers of
-/// images()) are matched, where it is given. `known_lenses`: the groups' parameters are given, not
-/// guesses.
-void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& groups,
+/// What is known of photos before they are matched.
+struct PhotosToMatch {
+  std::vector<CameraGroup> groups;
+  /// Of the pairs that options.matching names only these (a < b, sorted; numbers of images()) are
+  /// matched, where they are given.
+  std::optional<ImagePairs> allowed = {};
+  bool known_lenses = false;  ///< the groups' parameters are given, not guesses
+};
+
+/// Steps "features" and "matches" of the workspace. What was planned goes to `report`. `part`: this
+/// alone.
+void FeaturesAndMatches(Workspace& workspace, const PhotosToMatch& photos,
                         const SfmOptions& options, SfmReport& report,
-                        const std::optional<ImagePairs>& allowed = {}, bool known_lenses = false);
+                        const std::optional<SfmPart>& part = {});
 
 /// Fills in what every report has: runs, version, who did not register, the error; writes it.
 void CompleteReport(const Workspace& workspace, const calib::SfmModel& model, SfmReport& report);

@@ -250,7 +250,7 @@ const std::string& Workspace::NameOfAlias(const std::string& alias) const {
 }
 
 void Workspace::Step(const std::string& name, const std::string& inputs,
-                     const std::function<void()>& body) {
+                     const std::function<void()>& body, bool is_part) {
   fingerprint_ = HashOfText(fingerprint_ + "\n" + name + "\n" + inputs);
   const fs::path stamp = folder_ / (name + ".done.json");
   if (const auto finished = ReadStamp(stamp, fingerprint_)) {
@@ -269,6 +269,7 @@ void Workspace::Step(const std::string& name, const std::string& inputs,
     ThrowFullDisk(folder_, error.what());
     throw;
   }
+  if (is_part) return;
   // The stamp vouches for what other programs wrote, which sync nothing.
   ran_program_ ? SyncTree(folder_) : SyncFolder(folder_);
   WriteStamp(stamp, fingerprint_, std::span(records_).subspan(first_of_step_), {});

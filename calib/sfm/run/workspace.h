@@ -46,8 +46,9 @@ class Workspace {
 
   /// Runs `body`, which leaves its files on the disk, unless an earlier call finished the step
   /// `name` on the same inputs: photos (names, sizes, contents), version, all steps before, and
-  /// `inputs` (options, as text).
-  void Step(const std::string& name, const std::string& inputs, const std::function<void()>& body);
+  /// `inputs` (options, as text). `is_part`: the step is not finished with it.
+  void Step(const std::string& name, const std::string& inputs, const std::function<void()>& body,
+            bool is_part = false);
 
   /// Identity of the step running now (or last begun): hash of everything it depends on.
   const std::string& fingerprint() const { return fingerprint_; }

@@ -76,36 +76,6 @@ void RequirePart(const BuildPart& part, const std::vector<BuildStage>& stages) {
   }
 }
 
-bool IsShared(const BuildPart& part, const std::vector<BuildStage>& stages) {
-  return std::any_of(stages.begin(), stages.end(), [&](const BuildStage& stage) {
-    return stage.name == part.stage && stage.has_parts;
-  });
-}
-
-std::optional<sfm::SfmPart> SfmPartOf(const BuildPart& part) {
-  using Stage = sfm::SfmStage;
-  constexpr std::pair<const char*, Stage> kStages[] = {{"capture", Stage::kPhotos},
-                                                       {"features", Stage::kFeatures},
-                                                       {"pairs", Stage::kPairs},
-                                                       {"matching", Stage::kMatching},
-                                                       {"verification", Stage::kVerification}};
-  for (const auto& [name, stage] : kStages) {
-    if (part.stage == name) return sfm::SfmPart{stage, part.part};
-  }
-  return std::nullopt;
-}
-
-std::optional<DepthStagePart> DepthPartOf(const BuildPart& part, int passes) {
-  if (part.stage == "ranges") return DepthStagePart{.ranges_alone = true, .depth = {}};
-  for (int pass = 0; pass <= passes + 1; ++pass) {
-    const std::string name = pass > passes ? "maps"
-                             : pass == 0   ? "search"
-                                           : fmt::format("pass-{}", pass);
-    if (part.stage == name) return DepthStagePart{.depth = {pass, part.part}};
-  }
-  return std::nullopt;
-}
-
 FileLock LockPart(const fs::path& work, const BuildPart& part) {
   MakeFolder(work / kFolder);
   auto lock = FileLock::Try(FileOf(work, part, ".lock"));
@@ -125,19 +95,22 @@ void WriteDonePart(const fs::path& work, const BuildPart& part, const DonePart& 
   WriteFileAtomically(FileOf(work, part, ".done.json"), json.dump() + "\n");
 }
 
-std::optional<DonePart> ReadDonePart(const fs::path& work, const BuildPart& part) {
-  return DoneIn(FileOf(work, part, ".done.json"));
+std::string NameOf(const BuildPart& part) {
+  if (part.part.count == 1) return part.stage;
+  return fmt::format("{}, part {} of {}", part.stage, part.part.index + 1, part.part.count);
 }
 
-DonePart TotalOf(const fs::path& work, const std::vector<std::string>& stages) {
+std::optional<DonePart> FindDonePart(const fs::path& output, const BuildPart& part) {
+  return DoneIn(FileOf(io::SetWriter::WorkFolderOf(output), part, ".done.json"));
+}
+
+bool HasParts(const fs::path& work) { return fs::is_directory(work / kFolder); }
+
+DonePart TotalOf(const fs::path& work, const std::string& stage) {
   DonePart total;
-  if (!fs::is_directory(work / kFolder)) return total;
+  if (!HasParts(work)) return total;
   for (const auto& entry : fs::directory_iterator(work / kFolder)) {
-    const std::string stage = StageOfRecord(entry.path().filename().string());
-    const bool counts = std::any_of(stages.begin(), stages.end(), [&](const std::string& one) {
-      return stage == one || (one == "pass" && stage.starts_with("pass-"));
-    });
-    if (!counts) continue;
+    if (StageOfRecord(entry.path().filename().string()) != stage) continue;
     const DonePart part = DoneIn(entry.path()).value_or(DonePart{});
     total.wall_s += part.wall_s;
     total.cpu_s += part.cpu_s;

@@ -7,21 +7,12 @@
 #include "dtr/io/set_io.h"
 #include "pipeline/build/build_part.h"
 #include "pipeline/core/calibrate.h"
-#include "pipeline/core/depth/depth_stage.h"
 
 namespace dtr::pipeline {
 
 /// Rejects a stage that the build does not have, a part that is none, and parts of a stage that one
 /// process does. Throws UsageError.
 void RequirePart(const BuildPart& part, const std::vector<BuildStage>& stages);
-
-/// Whether other processes work on the set at the same time.
-bool IsShared(const BuildPart& part, const std::vector<BuildStage>& stages);
-
-/// Which part of structure from motion that is; nothing where it is of a later stage.
-std::optional<sfm::SfmPart> SfmPartOf(const BuildPart& part);
-/// The same of depth; nothing where it is of an earlier stage. `passes`: of the engine.
-std::optional<DepthStagePart> DepthPartOf(const BuildPart& part, int passes);
 
 /// Held while a part is worked on: throws UsageError where another process does.
 FileLock LockPart(const std::filesystem::path& work, const BuildPart& part);
@@ -31,10 +22,10 @@ void MarkBegun(const std::filesystem::path& work);
 
 /// Says that a part is done, and what it took.
 void WriteDonePart(const std::filesystem::path& work, const BuildPart& part, const DonePart& done);
-std::optional<DonePart> ReadDonePart(const std::filesystem::path& work, const BuildPart& part);
-/// What all parts of these stages took, and stages that one process did; 0 where there are none.
-/// "pass" is every pass.
-DonePart TotalOf(const std::filesystem::path& work, const std::vector<std::string>& stages);
+/// What all parts of the stage took; 0 where there are none.
+DonePart TotalOf(const std::filesystem::path& work, const std::string& stage);
+/// Whether there are records of any.
+bool HasParts(const std::filesystem::path& work);
 
 /// Freezes cameras for the stages after them: model, unit, origin and the photos without a camera.
 void FreezeCalibration(const CalibratedPhotos& calibrated, const std::filesystem::path& work);

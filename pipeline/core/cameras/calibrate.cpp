@@ -52,7 +52,8 @@ SfmSummary SummaryOf(const sfm::SfmReport& report, const calib::SfmModel& model)
 }
 
 CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions& options,
-                         const fs::path& workspace, Progress& progress) {
+                         const fs::path& workspace, const std::optional<sfm::SfmPart>& part,
+                         Progress& progress) {
   std::vector<bool> in_sfm(capture.photos.size(), true);
   if (options.strict) {
     for (size_t i = 0; i < in_sfm.size(); ++i) in_sfm[i] = !options.held_out[i];
@@ -64,7 +65,7 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
     if (!options.lens) break;
     input.known_lens = LensFor(*options.lens, input.width_px, input.height_px, input.name);
   }
-  sfm::SfmOptions sfm_options = SfmOptionsFor(options);
+  sfm::SfmOptions sfm_options = SfmOptionsFor(options, part);
   if (options.lens) {
     sfm_options.intrinsics_are_known = true;
     sfm_options.lens_model = calib::NameOf(options.lens->model);
@@ -74,9 +75,10 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
     sfm_options.intrinsics_are_known = true;
     sfm_options.lens_model = calib::NameOf(calib::CameraModel::kSimplePinhole);
   }
-  PreparePhotos(photos, options, workspace / "photos", progress);
+  PreparePhotos(photos, options, part, workspace / "photos", progress);
   sfm::SfmResult sfm =
-      sfm::RunSfm(workspace / "photos", inputs, workspace / "sfm", sfm_options, progress);
+      sfm::RunSfm(workspace / "photos", inputs, workspace / "sfm", sfm_options, progress, part);
+  if (part) return {};
   if (panoramas) {
     CompletePanoramas(photos, *options.rig, inputs, workspace, sfm_options, sfm, progress);
   }
@@ -116,7 +118,7 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
 void HintAtFisheye(const capture::Capture& capture, const CalibrateOptions& options,
                    Progress& progress) {
   const auto model = calib::CameraModelFromName(options.sfm.lens_model);
-  if (!options.poses.empty() || options.rig || options.lens || IsShared(options.part)) return;
+  if (!options.poses.empty() || options.rig || options.lens) return;
   if (model && calib::IsFisheye(*model)) return;
   const std::string line = capture::LineOfImageCircle(capture.photos);
   if (!line.empty()) progress.Note(line);
@@ -153,8 +155,9 @@ bool IsShared(const std::optional<sfm::SfmPart>& part) {
 }
 
 void PreparePhotos(const capture::Capture& photos, const CalibrateOptions& options,
-                   const fs::path& folder, Progress& progress) {
-  if (IsShared(options.part)) return;  // other processes read them
+                   const std::optional<sfm::SfmPart>& part, const fs::path& folder,
+                   Progress& progress) {
+  if (IsShared(part)) return;  // other processes read them
   capture::PrepareSfmImages(photos, folder, 0, options.memory_gb, progress);
 }
 
@@ -172,7 +175,8 @@ std::vector<sfm::SfmImageInput> SfmInputs(const capture::Capture& capture,
   return inputs;
 }
 
-sfm::SfmOptions SfmOptionsFor(const CalibrateOptions& options) {
+sfm::SfmOptions SfmOptionsFor(const CalibrateOptions& options,
+                              const std::optional<sfm::SfmPart>& part) {
   sfm::SfmOptions sfm;
   sfm.colmap = &colmap::kSteps;
   sfm.engine = options.sfm.engine;
@@ -183,8 +187,7 @@ sfm::SfmOptions SfmOptionsFor(const CalibrateOptions& options) {
   sfm.max_features = options.sfm.features < max_features ? options.sfm.features : 0;
   sfm.matching = options.sfm.matching;
   sfm.lens_model = options.sfm.lens_model;
-  sfm.part = options.part;
-  sfm.folder_is_shared = IsShared(options.part);
+  sfm.folder_is_shared = IsShared(part);
   return sfm;
 }
 
@@ -215,7 +218,8 @@ void RequireCalibration(const fs::path& poses, const std::string& poses_format,
 }
 
 CalibratedPhotos CalibratePhotos(const capture::Capture& capture, const CalibrateOptions& options,
-                                 const fs::path& workspace, Progress& progress) {
+                                 const fs::path& workspace, Progress& progress,
+                                 const std::optional<sfm::SfmPart>& part) {
   CalibrateOptions checked = options;
   if (!checked.rig && checked.poses.empty()) checked.rig = RigOfPanoramas(capture);
   checked.held_out.resize(capture.photos.size(), false);
@@ -225,11 +229,11 @@ CalibratedPhotos CalibratePhotos(const capture::Capture& capture, const Calibrat
     RejectTurned(capture, "the intrinsics are");
     RequireLensOfPhotos(*checked.lens, capture, progress);
   }
-  HintAtFisheye(capture, checked, progress);
+  if (!IsShared(part)) HintAtFisheye(capture, checked, progress);
   fs::create_directories(workspace);
   CalibratedPhotos calibrated = checked.poses.empty()
-                                    ? FromSfm(capture, checked, workspace, progress)
-                                    : FromKnownPoses(capture, checked, workspace, progress);
+                                    ? FromSfm(capture, checked, workspace, part, progress)
+                                    : FromKnownPoses(capture, checked, workspace, part, progress);
   std::set<std::string> registered;
   for (const calib::SfmImage& image : calibrated.model.images) registered.insert(image.name);
   for (const capture::Photo& photo : capture.photos) {

@@ -152,7 +152,6 @@ TriangulatedCameras TriangulateAndTest(const GivenPhotos& given, Progress& progr
   } catch (const UsageError&) {
     throw;
   } catch (const Error& error) {
-    if (given.sfm.part) throw;  // what a part lacks says nothing of the cameras
     progress.Note(kNotFitting);
     const calib::ConventionReport report =
         TestAlone(given, images, SomeOf(images.size()), progress);

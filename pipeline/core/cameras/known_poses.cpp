@@ -20,6 +20,7 @@
 #include "pipeline/core/cameras/foreign_cameras.h"
 #include "pipeline/core/cameras/given_cameras.h"
 #include "pipeline/core/cameras/names_of_photos.h"
+#include "pipeline/core/model_grid.h"
 #include "pipeline/core/photos/named_files.h"
 
 namespace dtr::pipeline {
@@ -76,6 +77,8 @@ bool IsHeldOut(const std::string& name, const capture::Capture& capture,
 // Cameras as they were given; poses act on p_world - the recentred origin.
 struct Given {
   std::map<std::string, sfm::PosedImage> by_name;
+  /// The photos with the points of the file; empty: points are triangulated.
+  std::optional<calib::SfmModel> model;
   std::string first;  // of the file
   LengthUnit unit = LengthUnit::kUnknown;
   Eigen::Vector3d world_origin = Eigen::Vector3d::Zero();
@@ -123,7 +126,7 @@ std::optional<calib::ConventionReport> TestOfModel(const calib::SfmModel& model,
   for (const size_t i : some) {
     tested.photos.push_back(photos.photos[photo_of.at(model.images[i].name)]);
   }
-  PreparePhotos(tested, options, workspace / "photos", progress);
+  PreparePhotos(tested, options, {}, workspace / "photos", progress);
   const calib::ConventionReport report = TestWithPoints(model, given, some, progress);
   return report.tested() ? std::optional(report) : std::nullopt;
 }
@@ -131,7 +134,7 @@ std::optional<calib::ConventionReport> TestOfModel(const calib::SfmModel& model,
 // Points for cameras that came without any: COLMAP finds them with everything else held.
 CalibratedPhotos Triangulated(const Given& given, const capture::Capture& capture,
                               const CalibrateOptions& options, const fs::path& workspace,
-                              Progress& progress) {
+                              const std::optional<sfm::SfmPart>& part, Progress& progress) {
   std::vector<sfm::PosedImage> sources, held_out;
   capture::Capture source_photos;
   for (size_t i = 0; i < capture.photos.size(); ++i) {
@@ -146,12 +149,16 @@ CalibratedPhotos Triangulated(const Given& given, const capture::Capture& captur
     if (is_source) source_photos.photos.push_back(photo);
   }
   RequireSharedNames(sources.size(), options.poses, given.first, capture);
-  PreparePhotos(source_photos, options, workspace / "photos", progress);
+  PreparePhotos(source_photos, options, part, workspace / "photos", progress);
+  const sfm::SfmOptions sfm = SfmOptionsFor(options, part);
   CalibratedPhotos calibrated;
-  calibrated.unit = given.unit;
-  calibrated.world_origin = given.world_origin;
-  GivenPhotos photos{options.poses.filename().string(), sources, workspace, SfmOptionsFor(options)};
-  TriangulatedCameras triangulated = TriangulateAndTest(photos, progress);
+  if (part) {
+    sfm::TriangulateWithPoses(workspace / "photos", sources, workspace / "sfm", sfm, progress,
+                              part);
+    return calibrated;
+  }
+  TriangulatedCameras triangulated = TriangulateAndTest(
+      {options.poses.filename().string(), std::move(sources), workspace, sfm}, progress);
   calibrated.model = std::move(triangulated.model);
   calibrated.report.given_cameras = std::move(triangulated.conventions);
   for (const sfm::PosedImage& posed : held_out) {
@@ -162,66 +169,43 @@ CalibratedPhotos Triangulated(const Given& given, const capture::Capture& captur
 }
 
 // Photos with their points, or without: then these are triangulated.
-CalibratedPhotos FromModel(calib::SfmModel model, Given given, const capture::Capture& capture,
-                           const CalibrateOptions& options, const fs::path& workspace,
-                           Progress& progress) {
+Given GivenIn(calib::SfmModel model, const io::CameraList& list, const capture::Capture& capture,
+              const CalibrateOptions& options, Progress& progress) {
+  Given given;
+  given.unit = list.unit;
+  given.world_origin = list.world_origin;
+  given.first = model.images.empty() ? "" : model.images.front().name;
   std::erase_if(model.images, [&](const calib::SfmImage& image) {
     return std::none_of(capture.photos.begin(), capture.photos.end(),
                         [&](const capture::Photo& photo) { return photo.name == image.name; });
   });
   RequireSharedNames(model.images.size(), options.poses, given.first, capture);
   given.world_origin += RecentreModel(model);
-  CalibratedPhotos calibrated;
   // With one photo to build from there is nothing to triangulate, which is reported later.
   const auto sources = std::count_if(model.images.begin(), model.images.end(), [&](const auto& i) {
     return !IsHeldOut(i.name, capture, options);
   });
   const std::string unshared = LineOfUnsharedPoints(model, options.poses.string());
   if (!unshared.empty()) progress.Note(unshared);
-  if ((model.points.empty() || !unshared.empty()) && sources >= 2) {
-    for (const calib::SfmImage& image : model.images) {
-      given.by_name.emplace(
-          image.name,
-          sfm::PosedImage{image.name, model.cameras.at(image.camera_id), image.cam_from_world});
-    }
-    return Triangulated(given, capture, options, workspace, progress);
+  if ((!model.points.empty() && unshared.empty()) || sources < 2) {
+    given.model = std::move(model);
+    return given;
   }
-  calibrated = WithPointsOfFile(std::move(model), capture, options, workspace, progress);
-  calibrated.unit = given.unit;
-  calibrated.world_origin = given.world_origin;
-  return calibrated;
+  for (const calib::SfmImage& image : model.images) {
+    given.by_name.emplace(image.name, sfm::PosedImage{image.name, model.cameras.at(image.camera_id),
+                                                      image.cam_from_world});
+  }
+  return given;
 }
 
-CalibratedPhotos FromColmapModel(const capture::Capture& capture, const CalibrateOptions& options,
-                                 const fs::path& workspace, Progress& progress) {
-  std::vector<std::string> notes;
-  calib::SfmModel model = ReadModelOf(capture, options.poses, &notes);
-  for (const std::string& note : notes) progress.Note(note);
-  Given given;
-  given.first = model.images.empty() ? "" : model.images.front().name;
-  CalibratedPhotos calibrated =
-      FromModel(std::move(model), given, capture, options, workspace, progress);
-  calibrated.engine = "COLMAP model";
-  return calibrated;
-}
-
-CalibratedPhotos FromCameraList(const capture::Capture& capture, const CalibrateOptions& options,
-                                const fs::path& workspace, Progress& progress) {
+// The cameras of options.poses.
+Given GivenFor(const capture::Capture& capture, const CalibrateOptions& options,
+               Progress& progress) {
+  progress.Note("structure from motion left out: cameras are given");
   PosesFile file = ReadPoses(capture, options.poses, options.poses_format);
   for (const std::string& note : file.notes) progress.Note(note);
-  CalibratedPhotos calibrated;
-  if (file.model) {
-    Given given;
-    given.first = file.model->images.front().name;
-    given.unit = file.list.unit;
-    given.world_origin = file.list.world_origin;
-    calibrated = FromModel(std::move(*file.model), given, capture, options, workspace, progress);
-  } else {
-    const io::CameraList list = io::RecentreWorld(std::move(file.list));
-    calibrated = Triangulated(GivenIn(list), capture, options, workspace, progress);
-  }
-  calibrated.engine = options.poses.filename().string();
-  return calibrated;
+  return file.model ? GivenIn(std::move(*file.model), file.list, capture, options, progress)
+                    : GivenIn(io::RecentreWorld(std::move(file.list)));
 }
 
 // The photo that a path of a transforms.json means; its folders are those of the photos.
@@ -324,6 +308,12 @@ PosesFile ReadPoses(const capture::Capture& capture, const fs::path& poses,
   }
   const CameraFormat chosen = FormatOf(poses, format, "`poses`");
   const std::string kind = chosen.name;
+  if (kind == "colmap") {
+    PosesFile file;
+    file.model = ReadModelOf(capture, poses, &file.notes);
+    file.list.photo_grid = GridOfModel(colmap::ModelFolderIn(poses));
+    return file;
+  }
   if (chosen.read != nullptr) return FromForeign(images, chosen, capture, poses);
   if (kind == "nerf") return FromTransforms(images, capture, poses);
   if (kind == "llff") return {io::ReadLlff(poses, std::move(images)).list, {}, {}};
@@ -342,7 +332,11 @@ CalibratedPhotos WithPointsOfPhotos(const io::CameraList& list, const capture::C
                                     const CalibrateOptions& options, const fs::path& workspace,
                                     Progress& progress) {
   progress.Note("points are triangulated from the photos, with their cameras fixed");
-  return Triangulated(GivenIn(list), photos, options, workspace, progress);
+  const Given given = GivenIn(list);
+  CalibratedPhotos calibrated = Triangulated(given, photos, options, workspace, {}, progress);
+  calibrated.unit = given.unit;
+  calibrated.world_origin = given.world_origin;
+  return calibrated;
 }
 
 CalibratedPhotos WithPointsOfFile(calib::SfmModel model, const capture::Capture& photos,
@@ -350,7 +344,6 @@ CalibratedPhotos WithPointsOfFile(calib::SfmModel model, const capture::Capture&
                                   Progress& progress) {
   CalibratedPhotos calibrated;
   calibrated.model = std::move(model);
-  if (options.part) return calibrated;  // whoever ends the build tests and adjusts
   calibrated.report.given_cameras =
       TestOfModel(calibrated.model, photos, options, workspace, progress);
   RefineWhereAsked(options, false, calibrated, progress);
@@ -396,11 +389,19 @@ void RegisterHeldOutPhotos(const capture::Capture& held_out,
 }
 
 CalibratedPhotos FromKnownPoses(const capture::Capture& capture, const CalibrateOptions& options,
-                                const fs::path& workspace, Progress& progress) {
-  progress.Note("structure from motion left out: cameras are given");
-  CalibratedPhotos calibrated = IsColmapModel(options.poses, options.poses_format)
-                                    ? FromColmapModel(capture, options, workspace, progress)
-                                    : FromCameraList(capture, options, workspace, progress);
+                                const fs::path& workspace, const std::optional<sfm::SfmPart>& part,
+                                Progress& progress) {
+  Given given = GivenFor(capture, options, progress);
+  CalibratedPhotos calibrated;
+  if (!given.model) {
+    calibrated = Triangulated(given, capture, options, workspace, part, progress);
+  } else if (!part) {
+    calibrated = WithPointsOfFile(std::move(*given.model), capture, options, workspace, progress);
+  }
+  calibrated.unit = given.unit;
+  calibrated.world_origin = given.world_origin;
+  const bool is_colmaps = IsColmapModel(options.poses, options.poses_format);
+  calibrated.engine = is_colmaps ? "COLMAP model" : options.poses.filename().string();
   return calibrated;
 }
 

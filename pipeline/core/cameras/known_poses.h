@@ -17,23 +17,26 @@ namespace dtr::pipeline {
 std::vector<sfm::SfmImageInput> SfmInputs(const capture::Capture& capture,
                                           const CameraGroups& groups,
                                           const std::filesystem::path& folder);
-sfm::SfmOptions SfmOptionsFor(const CalibrateOptions& options);
+sfm::SfmOptions SfmOptionsFor(const CalibrateOptions& options,
+                              const std::optional<sfm::SfmPart>& part = {});
 
 /// Whether other processes work in the folder of structure from motion at the same time.
 bool IsShared(const std::optional<sfm::SfmPart>& part);
 /// capture::PrepareSfmImages into `folder`, unless a process before did that for several.
 void PreparePhotos(const capture::Capture& photos, const CalibrateOptions& options,
-                   const std::filesystem::path& folder, Progress& progress);
+                   const std::optional<sfm::SfmPart>& part, const std::filesystem::path& folder,
+                   Progress& progress);
 
 /// Cameras of a file, with lines about it that are worth telling.
 struct PosesFile {
   io::CameraList list;
   std::vector<std::string> notes;
-  /// The same with points, where the file says which photos show them.
+  /// The same with points, where the file says which photos show them; of COLMAP alone: `list` has
+  /// no cameras then.
   std::optional<calib::SfmModel> model;
 };
 
-/// Reads cameras of any format of CameraFormatTable() but a COLMAP model for photos; `format`: its
+/// Reads cameras of any format of CameraFormatTable() for photos; `format`: its
 /// name, empty: by the content. Throws UsageError where it is not recognised, Error for a broken
 /// file or one of other photos.
 PosesFile ReadPoses(const capture::Capture& capture, const std::filesystem::path& poses,
@@ -56,9 +59,10 @@ CalibratedPhotos WithPointsOfFile(calib::SfmModel model, const capture::Capture&
 /// Where these bring no points, points are triangulated with the cameras held fixed, from photos
 /// that are not held out. Cameras far from the origin get a world origin
 /// near them (io::RecentreWorld). Photos that the file does not name stay without a camera. Throws
-/// Error when the file is broken or names too few of the photos.
+/// Error when the file is broken or names too few of the photos. `part`: as of CalibratePhotos.
 CalibratedPhotos FromKnownPoses(const capture::Capture& capture, const CalibrateOptions& options,
-                                const std::filesystem::path& workspace, Progress& progress);
+                                const std::filesystem::path& workspace,
+                                const std::optional<sfm::SfmPart>& part, Progress& progress);
 
 /// Adds the poses of held-out photos to a model that was made without them. Nothing else of the
 /// model changes; photos that cannot be registered are left out. `panoramas`: the rig that all

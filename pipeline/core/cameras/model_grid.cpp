@@ -6,11 +6,8 @@
 #include <map>
 #include <string>
 
-#include "calib/colmap/model_io.h"
 #include "dtr/base/files.h"
-#include "pipeline/core/cameras/camera_formats.h"
 #include "pipeline/core/cameras/known_poses.h"
-#include "pipeline/core/cameras/names_of_photos.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -28,21 +25,17 @@ struct CameraSizes {
 CameraSizes SizesOf(const fs::path& poses, const std::string& format,
                     const capture::Capture& photos) {
   CameraSizes sizes;
-  if (IsColmapModel(poses, format)) {
-    const fs::path folder = colmap::ModelFolderIn(poses);
-    const calib::SfmModel model = ReadModelOf(photos, poses);
-    for (const calib::SfmImage& image : model.images) {
-      const calib::LensCamera& camera = model.cameras.at(image.camera_id);
-      sizes.by_name[image.name] = {camera.width_px, camera.height_px};
-    }
-    sizes.convention = GridOfModel(folder);
-    return sizes;
-  }
-  const io::CameraList list = ReadPoses(photos, poses, format).list;
-  for (const io::NamedCamera& named : list.cameras) {
+  const PosesFile file = ReadPoses(photos, poses, format);
+  for (const io::NamedCamera& named : file.list.cameras) {
     sizes.by_name[named.name] = {named.camera.width_px(), named.camera.height_px()};
   }
-  sizes.convention = list.photo_grid;
+  if (file.list.cameras.empty() && file.model) {
+    for (const calib::SfmImage& image : file.model->images) {
+      const calib::LensCamera& camera = file.model->cameras.at(image.camera_id);
+      sizes.by_name[image.name] = {camera.width_px, camera.height_px};
+    }
+  }
+  sizes.convention = file.list.photo_grid;
   return sizes;
 }
 

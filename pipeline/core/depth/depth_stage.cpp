@@ -183,17 +183,17 @@ struct RangeInputs {
   const DepthStageOptions& options;
 };
 
-// Depth ranges are found once: a later run, and processes with a part, take those of the first.
-void KeepRanges(const RangeInputs& in, const std::function<bool(int)>& is_done, PlaneFiles& planes,
-                stereo::DepthMapsOptions& depth, Progress& progress) {
+// Depth ranges are found once, where `finds`: a later run, and later steps, take those of the
+// first.
+void KeepRanges(const RangeInputs& in, bool finds, const std::function<bool(int)>& is_done,
+                PlaneFiles& planes, stereo::DepthMapsOptions& depth, Progress& progress) {
   if (!in.options.ranges.empty()) return;  // given
   const auto count = static_cast<int>(in.views.size());
   bool all_done = true;
   for (int view = 0; view < count && all_done; ++view) all_done = is_done(view);
   if (all_done) return;
   auto ranges = planes.LoadRanges(in.views.size());
-  const bool ranges_alone = in.options.part && in.options.part->ranges_alone;
-  if (!ranges && in.options.part && !ranges_alone) {
+  if (!ranges && !finds) {
     throw Error(
         "depth: expected depth ranges that were found, found none; run the stage ranges "
         "first");
@@ -202,16 +202,14 @@ void KeepRanges(const RangeInputs& in, const std::function<bool(int)>& is_done, 
     ranges = stereo::WidenedRanges(in.views, in.scene, in.engine, depth, progress);
     planes.SaveRanges(*ranges);
   }
-  if (ranges_alone) throw PartDone();
   depth.given_ranges = std::move(*ranges);
   depth.widenings = 0;
 }
 
 // Processes that share the work have folders of their own for what they throw away.
-std::string EstimatesOf(const std::optional<DepthStagePart>& part) {
-  if (!part) return "estimates";
-  const auto& [pass, share] = part->depth;
-  return fmt::format("estimates_{}_{}_of_{}", pass, share.index, share.count);
+std::string EstimatesOf(const std::optional<DepthStep>& step) {
+  if (!step) return "estimates";
+  return fmt::format("estimates_{}_{}_of_{}", step->pass, step->part.index, step->part.count);
 }
 
 }  // namespace
@@ -224,7 +222,8 @@ void StoreImage(View& view, LengthUnit unit, io::SetWriter& writer) {
 
 DepthStageResult DepthStage(DtrSet& set, const SparseScene& sparse, const DepthChoice& choice,
                             const stereo::QualitySettings& asked, const DepthStageOptions& options,
-                            io::SetWriter& writer, Progress& progress) {
+                            io::SetWriter& writer, Progress& progress,
+                            const std::optional<DepthStep>& step) {
   if (choice.engine == "none") {
     progress.Note("depth left out: `engine` none");
     return {asked, std::nullopt, {}};
@@ -287,20 +286,31 @@ DepthStageResult DepthStage(DtrSet& set, const SparseScene& sparse, const DepthC
   // The other half holds photos, and maps that wait for their neighbours to be done.
   depth_options.engine.memory_gb = choice.memory_gb.value_or(kDefaultMemoryGb) / 2;
   const std::string made_from = HashOf(sources.stereo, scene);
-  PlaneFiles planes(work / "planes", made_from, options.part && !options.part->ranges_alone);
+  const bool finds_ranges = !step || step->pass == DepthStep::kRanges;
+  PlaneFiles planes(work / "planes", made_from, !finds_ranges);
   const NormalFiles normals(work, options.normals);
   const auto is_done = [&](int source) {
     const View& view = view_of(source);
     return view.depth_file.has_value() && normals.Has(view);
   };
-  EstimateFiles estimates(work / EstimatesOf(options.part));
-  if (options.part) depth_options.part = options.part->depth;
+  const auto is_done_or_others = [&](int source) {
+    const auto item = static_cast<size_t>(source);
+    return (step && !step->part.Has(item, sources.stereo.size())) || is_done(source);
+  };
+  EstimateFiles estimates(work / EstimatesOf(step));
+  depth_options.has_passes = step.has_value();
   depth_options.planes = &planes;
   depth_options.estimates = &estimates;
   ComputeWithin(choice.memory_gb, depth_options, progress, [&] {
-    KeepRanges({sources.stereo, scene, *engine, options}, is_done, planes, depth_options, progress);
+    KeepRanges({sources.stereo, scene, *engine, options}, finds_ranges, is_done, planes,
+               depth_options, progress);
+    if (step && finds_ranges) return;
+    if (step && step->pass <= engine->Rounds()) {
+      return stereo::ComputeDepthPass(sources.stereo, scene, *engine, depth_options, step->pass,
+                                      progress, is_done_or_others);
+    }
     stereo::ComputeDepthMaps(
-        sources.stereo, scene, *engine, depth_options, progress, is_done,
+        sources.stereo, scene, *engine, depth_options, progress, is_done_or_others,
         [&](int source, stereo::DepthEstimate&& estimate, const stereo::DepthRange& range) {
           View& view = view_of(source);
           if (!options.ranges.empty()) StoreWithin(range, view);
@@ -310,7 +320,7 @@ DepthStageResult DepthStage(DtrSet& set, const SparseScene& sparse, const DepthC
           WriteDepth(view, std::move(estimate), set.unit, writer);
         });
   });
-  if (options.part) throw PartDone();
+  if (step) return {quality, std::nullopt, made_from};
   if (options.gains) {
     const double memory_gb = choice.memory_gb.value_or(kDefaultMemoryGb);
     SetGains(set, scene, writer.folder(), memory_gb, progress);

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "dtr/base/part.h"
 #include "dtr/base/progress.h"
 #include "dtr/io/set_io.h"
 #include "dtr/types/dtr_set.h"
@@ -19,11 +20,13 @@
 
 namespace dtr::pipeline {
 
-/// Of the depth stage what one of several processes does.
-struct DepthStagePart {
-  /// Depth ranges, widened where they prove too narrow: one process, before all others.
-  bool ranges_alone = false;
-  stereo::DepthPart depth;  ///< else this
+/// A step of the depth stage, for one of several processes that share the set.
+struct DepthStep {
+  static constexpr int kRanges = -1;
+  /// kRanges: depth ranges, widened where they prove too narrow, by one process; 0: the search; 1
+  /// and more: passes of an engine that has any; one more than these: the maps.
+  int pass = kRanges;
+  Part part = {};  ///< of the views
 };
 
 struct DepthStageOptions {
@@ -43,8 +46,6 @@ struct DepthStageOptions {
   /// Called before the error of a depth prior that is rejected is thrown, so that what was done
   /// before may be kept; empty: the writer's work is discarded.
   std::function<void()> keep_work = {};
-  /// Does this alone and throws PartDone; Error where what it needs is missing. Empty: everything.
-  std::optional<DepthStagePart> part = {};
 };
 
 /// What became of the depth stage.
@@ -68,10 +69,10 @@ void StoreImage(View& view, LengthUnit unit, io::SetWriter& writer);
 /// (StoreImage). Views finished by an earlier, interrupted run are taken from the writer. Only
 /// source views and the points they alone know reach the engine. Pixels are in memory only as long
 /// as they are worked with, within the memory chosen: UsageError when that is too little. Throws as
-/// DepthPriors does.
+/// DepthPriors does. With `step` only this is done, and Error where a step before it is not.
 DepthStageResult DepthStage(DtrSet& set, const SparseScene& sparse, const DepthChoice& choice,
                             const stereo::QualitySettings& quality,
                             const DepthStageOptions& options, io::SetWriter& writer,
-                            Progress& progress);
+                            Progress& progress, const std::optional<DepthStep>& step = {});
 
 }  // namespace dtr::pipeline

@@ -66,7 +66,7 @@ std::vector<View> UndistortPhotos(const capture::Capture& capture,
                                   const CalibratedPhotos& calibrated,
                                   const std::vector<bool>& held_out,
                                   const UndistortOptions& options, io::SetWriter& writer,
-                                  Progress& progress) {
+                                  Progress& progress, const Part& part) {
   const calib::SfmModel& model = calibrated.model;
   std::map<std::string, const calib::SfmImage*> registered;
   for (const auto& image : model.images) registered[image.name] = &image;
@@ -92,7 +92,7 @@ std::vector<View> UndistortPhotos(const capture::Capture& capture,
     views.push_back(std::move(view));
     photos.push_back(&photo);
   }
-  const size_t begin = options.part.Begin(views.size()), end = options.part.End(views.size());
+  const size_t begin = part.Begin(views.size()), end = part.End(views.size());
   const auto bytes = [&](size_t k) {
     const capture::Photo& photo = *photos[begin + k];
     return std::max(capture::MemoryOf(photo), kBytesPerPixel * photo.width_px * photo.height_px);

@@ -70,8 +70,8 @@ class OfFiles {
     options.journal_inputs = "inputs";
     return options;
   }
-  MatchResult Run(const MatchOptions& options) const {
-    return MatchPhotos(photos_, std::vector{Camera(1200)}, {false}, options);
+  MatchResult Run(const MatchOptions& options, const std::optional<MatchPart>& part = {}) const {
+    return MatchPhotos(photos_, std::vector{Camera(1200)}, {false}, options, part);
   }
   MatchResult InMemory() const {
     return MatchPhotos(whole_, std::vector{Camera(1200)}, {false}, {});
@@ -198,10 +198,9 @@ TEST(PairJournal, OtherInputsAndOtherFeaturesCountForNothing) {
 }
 
 // Runs one part; the result is in the journal.
-void RunPart(const OfFiles& files, MatchOptions options, MatchPart::Stage stage, int index,
+void RunPart(const OfFiles& files, const MatchOptions& options, MatchPart::Stage stage, int index,
              int count) {
-  options.part = {stage, {index, count}};
-  EXPECT_THROW(files.Run(options), PartDone);
+  files.Run(options, MatchPart{stage, {index, count}});
 }
 
 TEST(MatchInParts, PartsInAnyOrderGiveWhatOneProcessGives) {
@@ -225,11 +224,10 @@ TEST(MatchInParts, WhatAPartNeedsAndNobodyDidIsNamed) {
   using Stage = MatchPart::Stage;
   OfFiles files;
   const testing::TemporaryFolder folder;
-  MatchOptions options = files.Journaled(folder);
+  const MatchOptions options = files.Journaled(folder);
   const auto message = [&](Stage stage) {
-    options.part = {stage, {0, 2}};
     try {
-      files.Run(options);
+      files.Run(options, MatchPart{stage, {0, 2}});
     } catch (const Error& error) {
       return std::string(error.what());
     }
