@@ -77,7 +77,7 @@ class PublishedRig : public ::testing::Test {
   void SetUp() override {
     DTR_REQUIRE_DATA(Folder());
     SilentProgress silent;
-    photos_ = pipeline::ReadRigPhotos(Folder(), board_, {}, 0, silent);
+    photos_ = pipeline::ReadRigPhotos(Folder(), board_, {}, silent);
     published_ = Published(photos_.cameras);
   }
 
