@@ -19,7 +19,8 @@ int Number(const char* variable) {
   return text == nullptr ? -1 : atoi(text);
 }
 
-// Libraries that the program is linked with were loaded, and have started their threads, by now.
+// Libraries that the program is linked with, and those of images, which are loaded with this one,
+// have started their threads by now: some end the program where they cannot.
 std::atomic<int> threads_left = -1, calls_left = -1;
 __attribute__((constructor)) void ReadEnvironment() {
   threads_left = Number("DTR_TEST_THREADS");
