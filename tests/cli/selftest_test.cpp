@@ -14,18 +14,17 @@ namespace {
 
 using Json = nlohmann::json;
 
-Case CaseOf(const std::string& name, std::function<Outcome(const Conditions&)> run,
-            bool quick = true) {
+Case CaseOf(const std::string& name, std::function<Outcome()> run, bool quick = true) {
   return {"stage", name, quick, std::move(run)};
 }
 
-Row RunOne(std::function<Outcome(const Conditions&)> run) {
+Row RunOne(std::function<Outcome()> run) {
   SilentProgress progress;
-  return RunCases({CaseOf("case", std::move(run))}, {}, true, progress).at(0);
+  return RunCases({CaseOf("case", std::move(run))}, true, progress).at(0);
 }
 
 Row RowOf(const Measure& measure) {
-  return RunOne([measure](const Conditions&) {
+  return RunOne([measure]() {
     Outcome outcome;
     outcome.Add(measure);
     return outcome;
@@ -46,9 +45,9 @@ TEST(StabilityRow, HoldsWhereItsValueHoldsTheBound) {
 }
 
 TEST(StabilityRow, NothingMeasuredWhatIsNotFiniteAndWhatIsThrownFailIt) {
-  EXPECT_FALSE(RunOne([](const Conditions&) { return Outcome(); }).passed());
+  EXPECT_FALSE(RunOne([]() { return Outcome(); }).passed());
   const auto look = [](double value) {
-    return RunOne([value](const Conditions&) {
+    return RunOne([value]() {
       Outcome outcome;
       outcome.Add(Exactly("x", 0, 0, ""));
       outcome.Look(value);
@@ -57,20 +56,20 @@ TEST(StabilityRow, NothingMeasuredWhatIsNotFiniteAndWhatIsThrownFailIt) {
   };
   EXPECT_TRUE(look(1e300).passed());
   EXPECT_FALSE(look(std::numeric_limits<double>::infinity()).passed());
-  const Row thrown = RunOne([](const Conditions&) -> Outcome { throw Error("broken"); });
+  const Row thrown = RunOne([]() -> Outcome { throw Error("broken"); });
   EXPECT_FALSE(thrown.passed());
   EXPECT_NE(ToMarkdown({thrown}).find("broken"), std::string::npos);
 }
 
 TEST(StabilityRow, ARejectionMustHappenAndKeepsItsWords) {
-  const Row refused = RunOne([](const Conditions&) {
+  const Row refused = RunOne([]() {
     Outcome outcome;
     ExpectRejection(outcome, "it", [] { throw Error("words"); });
     return outcome;
   });
   EXPECT_TRUE(refused.passed());
   EXPECT_EQ(refused.outcome.rejection, "words");
-  EXPECT_FALSE(RunOne([](const Conditions&) {
+  EXPECT_FALSE(RunOne([]() {
                  Outcome outcome;
                  ExpectRejection(outcome, "it", [] {});
                  return outcome;
@@ -79,10 +78,10 @@ TEST(StabilityRow, ARejectionMustHappenAndKeepsItsWords) {
 
 TEST(StabilityTable, TheShortFormLeavesOutTheLongCases) {
   SilentProgress progress;
-  const auto run = [](const Conditions&) { return Outcome(); };
+  const auto run = []() { return Outcome(); };
   const std::vector<Case> cases = {CaseOf("a", run), CaseOf("b", run, false)};
-  EXPECT_EQ(RunCases(cases, {}, true, progress).size(), 1u);
-  EXPECT_EQ(RunCases(cases, {}, false, progress).size(), 2u);
+  EXPECT_EQ(RunCases(cases, true, progress).size(), 1u);
+  EXPECT_EQ(RunCases(cases, false, progress).size(), 2u);
 }
 
 TEST(StabilityTable, JsonHasTheDocumentedNames) {
@@ -117,15 +116,15 @@ std::vector<Case> QuickCases() {
 }
 
 TEST(StabilityTable, WhatCannotBeRunIsListedNeverPassedNeverFailed) {
-  Case lost = CaseOf("b", [](const Conditions&) -> Outcome { throw Error("run all the same"); });
+  Case lost = CaseOf("b", []() -> Outcome { throw Error("run all the same"); });
   lost.skipped = "no such machine";
-  const Case fine = CaseOf("a", [](const Conditions&) {
+  const Case fine = CaseOf("a", []() {
     Outcome outcome;
     outcome.Add(Exactly("x", 0, 0, ""));
     return outcome;
   });
   SilentProgress progress;
-  const std::vector<Row> rows = RunCases({fine, lost}, {}, true, progress);
+  const std::vector<Row> rows = RunCases({fine, lost}, true, progress);
   ASSERT_EQ(rows.size(), 2u);
   EXPECT_FALSE(rows[1].passed());
   EXPECT_FALSE(rows[1].failed());
