@@ -1,6 +1,6 @@
-// tests/cli/program_server.h -- `dtr` started once for many runs. Most of a short run with images is
-// the loader's: 0.4 s for more than 300 shared libraries. A server, which links OpenImageIO, loads
-// them once and forks for every run.
+// tests/cli/program_server.h -- `dtr` started once for many runs. Most of a short run with images
+// is the loader's: 0.4 s for more than 300 shared libraries. A server, which links OpenImageIO,
+// loads them once and forks for every run.
 #pragma once
 #include <sys/types.h>
 
