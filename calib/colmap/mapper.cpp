@@ -144,7 +144,9 @@ class MappedDatabase {
     made_ = DatabaseOf(workspace);
     WriteGraphDatabase(made_, graph, sfm::FeatureFile(workspace.folder() / sfm::kFeatureFile));
   }
-  ~MappedDatabase() { TryRemoveFile(made_); }
+  ~MappedDatabase() {
+    if (!made_.empty()) TryRemoveFile(made_);
+  }
 
  private:
   fs::path made_;

@@ -49,12 +49,12 @@ if(PYTHON)
     message(FATAL_ERROR "python: expected the installed package and depth of 48 x 64, found\n${output}")
   endif()
 endif()
-# Without its module the program describes sets, and one line says why it renders none.
+# Without its module the program describes sets, and one line says why it writes no JPEG.
 file(GLOB_RECURSE module ${prefix}/lib*/dtr/dtr_images.so)
 list(FILTER module EXCLUDE REGEX python)
 file(REMOVE ${module})
 run(${prefix}/bin/dtr info ${WORK}/plane.dtr)
-execute_process(COMMAND ${prefix}/bin/dtr render ${WORK}/plane.dtr --like 0001 -o ${WORK}/x.png
+execute_process(COMMAND ${prefix}/bin/dtr render ${WORK}/plane.dtr --like 0001 -o ${WORK}/x.jpg
   RESULT_VARIABLE code ERROR_VARIABLE output)
 if(NOT code EQUAL 1 OR NOT output MATCHES "dtr: images cannot be read or written, as a library cannot be loaded: dtr_images.so: [^\n]*\n$")
   message(FATAL_ERROR "render: expected an error about dtr_images.so, found ${code}: ${output}")
