@@ -9,17 +9,15 @@
 
 namespace dtr {
 
-/// Keeps items until as many are there as the caller has threads, or as `kBytes` hold, and then
+/// Keeps items until as many are there as the caller has threads, or as `most_bytes` hold, and then
 /// works on all of them at once (ParallelFor): images are encoded and compared on all cores between
 /// frames that were drawn on all cores, so that the time of a frame is the frame's own.
 template <typename Item>
 class Batches {
  public:
-  static constexpr double kBytes = 256e6;
-
-  Batches(double bytes_of_item, std::function<void(Item&)> work)
+  Batches(double bytes_of_item, double most_bytes, std::function<void(Item&)> work)
       : at_once_(static_cast<size_t>(
-            std::clamp(kBytes / bytes_of_item, 1.0, 1.0 * ThreadLimit::Current()))),
+            std::clamp(most_bytes / bytes_of_item, 1.0, 1.0 * ThreadLimit::Current()))),
         work_(std::move(work)) {}
 
   void Add(Item item) {

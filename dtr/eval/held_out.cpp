@@ -16,6 +16,7 @@ constexpr int kDifferenceGain = 4;  // an error of 2 levels of 255 is visible, 6
 constexpr int kGapPx = 4;
 constexpr std::uint8_t kGapGrey = 128;
 constexpr double kResultBytesPerPixel = 16;
+constexpr double kResultBytes = 256e6;  // at a time, beside a set that is in memory whole
 
 std::vector<const View*> ViewsToCompare(const DtrSet& set, bool leave_one_out) {
   std::vector<const View*> views;
@@ -115,7 +116,7 @@ EvaluationReport EvaluateHeldOut(const DtrSet& set, const EvaluateOptions& optio
   for (const View* view : views) {
     largest_px = std::max(largest_px, 1.0 * view->camera.width_px() * view->camera.height_px());
   }
-  Batches<Rendered> rendered(kResultBytesPerPixel * largest_px, [&](Rendered& frame) {
+  Batches<Rendered> rendered(kResultBytesPerPixel * largest_px, kResultBytes, [&](Rendered& frame) {
     ViewScore& score = report.views[frame.index];
     score = Score(*frame.view, frame.filled);
     score.render_ms = frame.ms;

@@ -5,7 +5,7 @@
 namespace dtr {
 
 void* FfmpegSymbol(const char* library, const char* function) {
-  return FunctionOfLibrary(library, function, "videos cannot be read");
+  return FunctionOfLibrary(library, function, "videos cannot be read or written");
 }
 
 }  // namespace dtr

@@ -28,12 +28,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Of the memory, for images that wait to be encoded together.
+constexpr double kShareOfImages = 0.06;
+
 // Writes frames where the output says: one image, a folder of images, or a video.
 class FrameSink {
  public:
   FrameSink(const RenderRequest& request, const std::vector<NovelFrame>& frames)
       : output_(request.output),
-        images_(BytesOfLargest(frames), [](Image& image) { Write(image); }) {
+        images_(BytesOfLargest(frames), kShareOfImages * request.memory_gb * kBytesPerGigabyte,
+                [](Image& image) { Write(image); }) {
     if (output_.extension() == ".mp4") {
       video_.emplace(output_, io::kVideoFramesPerSecond);
     } else if (request.several()) {

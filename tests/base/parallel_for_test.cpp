@@ -13,7 +13,10 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
+
+#include "dtr/base/batches.h"
 
 namespace dtr {
 namespace {
@@ -162,6 +165,20 @@ TEST(ParallelFor, AForkedProcessHasThreadsOfItsOwn) {
   int status = -1;
   ASSERT_EQ(waitpid(child, &status, 0), child);
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
+}
+
+TEST(Batches, AreAsLargeAsThreadsAndBytesAllowAndNothingIsLeft) {
+  const ThreadLimit limit(3);
+  for (const auto& [most_bytes, at_once] : {std::pair{100.0, 3}, {25.0, 2}, {1.0, 1}}) {
+    std::atomic<int> done{0};
+    Batches<int> batches(10, most_bytes, [&](int& item) { done += item; });
+    for (int added = 1; added <= 7; ++added) {
+      batches.Add(1);
+      EXPECT_EQ(done, added / at_once * at_once) << most_bytes;
+    }
+    batches.Finish();
+    EXPECT_EQ(done, 7);
+  }
 }
 
 TEST(ThreadLimit, HoldsUntilItGoesAndInTheLoopsInside) {
