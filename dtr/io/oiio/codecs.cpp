@@ -144,13 +144,14 @@ ImageSpec WishesFor(const std::optional<std::array<double, 3>>& raw_balance) {
   return wishes;
 }
 
-ImageSpec SpecOf(const ImageToWrite& image) {
+ImageSpec SpecOf(const std::string& extension, const ImageToWrite& image) {
   ImageSpec spec(image.width, image.height, image.channels, TypeOf(image.sample));
   if (!image.channel_names.empty()) spec.channelnames = image.channel_names;
   for (const auto& [name, value] : image.attributes) {
     std::visit([&, &name = name](const auto& given) { spec.attribute(name, given); }, value);
   }
-  spec.attribute("png:compressionLevel", kPngLevel);
+  // An EXR file would name it too, unless OpenImageIO has listed its formats by then.
+  if (extension == ".png") spec.attribute("png:compressionLevel", kPngLevel);
   return spec;
 }
 
@@ -175,7 +176,7 @@ class Oiio : public ImageCodecs {
     auto out = OIIO::ImageOutput::create(name);
     std::vector<unsigned char> bytes;
     OIIO::Filesystem::IOVecOutput memory(bytes);
-    if (out && out->set_ioproxy(&memory) && out->open(name, SpecOf(image)) &&
+    if (out && out->set_ioproxy(&memory) && out->open(name, SpecOf(extension, image)) &&
         out->write_image(TypeOf(sample), pixels) && out->close()) {
       return std::string(bytes.begin(), bytes.end());
     }
