@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "cli/number_checks.h"
@@ -49,6 +50,20 @@ const CalledApp* CallerOf(const CLI::App& app) {
   const CLI::App* root = &app;
   while (root->get_parent() != nullptr) root = root->get_parent();
   return dynamic_cast<const CalledApp*>(root);
+}
+
+/// The exit code of `act`, whose trace is written even if it throws: what failed is to be looked at.
+template <typename Act>
+int Traced(const std::filesystem::path& file, const Act& act) {
+  trace::Begin();
+  try {
+    const int code = act();
+    WriteFileAtomically(file, trace::End());
+    return code;
+  } catch (...) {
+    if (trace::IsOn()) WriteFileAtomically(file, trace::End());
+    throw;
+  }
 }
 
 }  // namespace
@@ -110,10 +125,9 @@ void AddCommand(CLI::App& app, const std::string& name, const std::string& descr
     if (called != nullptr) common->json_text = &called->json();
     Console console =
         called != nullptr ? Console(called->caller()) : Console(common->json_target == "-");
-    if (!trace_file->empty()) trace::Begin();
     const ThreadLimit limit(common->threads);
-    const int code = action(Context{*common, console});
-    if (!trace_file->empty()) WriteFileAtomically(*trace_file, trace::End());
+    const auto act = [&] { return action(Context{*common, console}); };
+    const int code = trace_file->empty() ? act() : Traced(*trace_file, act);
     if (code != kDone) throw CLI::RuntimeError(code);
   });
 }

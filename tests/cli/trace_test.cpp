@@ -88,6 +88,12 @@ TEST_F(Traced, ABuildWouldUseSixteenCores) {
   EXPECT_LT(found["serial %"], 12);
 }
 
+TEST_F(Traced, WhatFailedIsTracedAsWell) {
+  const fs::path trace = *folder_ / "failed.json";
+  EXPECT_EQ(Dtr({"info", (*folder_ / "nothing.dtr").string(), "--trace", trace.string()}).code, 1);
+  EXPECT_EQ(EventsOf(trace).at(0).at("cat"), "process");
+}
+
 TEST_F(Traced, AFileThatCannotBeIsNamedBeforeTheWork) {
   ExpectRejected(Dtr({"info", (*folder_ / "no.dtr").string(), "--trace",
                       (*folder_ / "no/trace.json").string()}),
