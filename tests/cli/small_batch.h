@@ -1,6 +1,8 @@
 // tests/cli/small_batch.h -- a build of a few tiny photos, in parts.
 #pragma once
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <signal.h>
 
 #include <filesystem>
 #include <map>
@@ -66,6 +68,30 @@ class Batch : public ::testing::Test {
   }
 
   const TemporaryFolder folder_;
+};
+
+/// What lies beside a set while `dtr batch` makes it.
+class BatchFolder : public Batch {
+ protected:
+  std::filesystem::path Folder() const { return Set("a").string() + ".batch"; }
+  std::filesystem::path Record() const { return Folder() / "batch.json"; }
+  std::filesystem::path Done(const std::string& part) const {
+    return Set("a").string() + ".partial/work/parts/" + part + ".done.json";
+  }
+  Ran Begin(const Interruption& interruption = {}) const {
+    return RunBatch("a", {"--local", "2", "--array-size", "3"}, interruption);
+  }
+  Ran Resume() const { return DtrByItself({"batch", "resume", Set("a").string()}); }
+  // Begins it, and ends it once something is there to go on with.
+  void Stop(int signal = SIGTERM) const {
+    Begin({signal, [&] { return std::filesystem::exists(Done("capture_1_of_1")); }});
+    ASSERT_TRUE(std::filesystem::exists(Record()));
+    ASSERT_FALSE(std::filesystem::exists(Set("a")));
+  }
+  void ExpectFinished() const {
+    EXPECT_THAT(DifferingFiles(Undisturbed(), Contents(Set("a"))), ::testing::IsEmpty());
+    EXPECT_FALSE(std::filesystem::exists(Set("a").string() + ".partial"));
+  }
 };
 
 }  // namespace dtr::testing
