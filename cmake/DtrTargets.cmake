@@ -114,6 +114,14 @@ function(dtr_drop_left_out list)
   set(${list} ${${list}} PARENT_SCOPE)
 endfunction()
 
+# Whether programs of these labels are built with all others.
+function(dtr_is_built_with_all labels result)
+  set(${result} TRUE PARENT_SCOPE)
+  if(NOT DTR_SLOW_TESTS AND "slow" IN_LIST labels)
+    set(${result} FALSE PARENT_SCOPE)
+  endif()
+endfunction()
+
 # No program where none of its tests is left.
 function(dtr_test_program name)
   cmake_parse_arguments(ARG "" "TIMEOUT;COST" "SOURCES;APART;LIBS;LABELS" ${ARGN})
@@ -123,6 +131,10 @@ function(dtr_test_program name)
     return()
   endif()
   add_executable(${name} ${ARG_SOURCES} ${ARG_APART})
+  dtr_is_built_with_all("${ARG_LABELS}" with_all)
+  if(NOT with_all)
+    set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
+  endif()
   dtr_unity(${name} ${ARG_APART})
   target_link_libraries(${name} PRIVATE ${ARG_LIBS} dtr_test_main GTest::gtest GTest::gmock)
   dtr_test_options(${name})
@@ -147,11 +159,12 @@ function(dtr_test name)
     COMMAND ${CMAKE_COMMAND} -DPROGRAM=$<TARGET_FILE:${name}> -DNAME=${name} -DOUTPUT=${entries}
       -DFOLDER=${PROJECT_SOURCE_DIR} -DTIMEOUT=${ARG_TIMEOUT} "-DLABELS=${ARG_LABELS}"
       -P ${PROJECT_SOURCE_DIR}/cmake/DiscoverSuites.cmake)
-  # A program that was not built is an entry that fails.
+  # A program that was not built, but was to be, is an entry that fails.
   set(file ${CMAKE_CURRENT_BINARY_DIR}/${name}_entries.cmake)
+  dtr_is_built_with_all("${ARG_LABELS}" with_all)
   file(WRITE ${file} "if(EXISTS \"${entries}\")
   include(\"${entries}\")
-else()
+elseif(${with_all})
   add_test(${name}_NOT_BUILT ${name}_NOT_BUILT)
 endif()
 ")
