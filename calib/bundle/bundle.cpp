@@ -65,24 +65,38 @@ Eigen::Vector2d PrincipalPoint(const LensCamera& lens) {
   return {lens.params[at], lens.params[at + 1]};
 }
 
-void AddSharedLenses(const SfmModel& model, Bundle& bundle) {
-  std::map<std::uint32_t, LensCamera> used;  // a lens without observations would be undetermined
-  for (const SfmImage& image : model.images) {
-    used.emplace(image.camera_id, model.cameras.at(image.camera_id));
-  }
+/// Images `names`, by the ids of their cameras; those of one LensGroup share its lens.
+void AddSharedLenses(const std::map<std::uint32_t, LensCamera>& cameras,
+                     std::span<const std::uint32_t> camera_of_image,
+                     std::span<const std::string> names, std::span<const Pose> cam_from_world,
+                     Bundle& bundle) {
   std::map<std::uint32_t, int> lens_of_camera;
-  for (const LensGroup& group : LensGroups(used)) {
+  for (const LensGroup& group : LensGroups(cameras)) {
     for (const std::uint32_t id : group.cameras) {
       lens_of_camera[id] = static_cast<int>(bundle.lenses.size());
     }
     bundle.lenses.push_back(group.lens);
   }
-  for (const SfmImage& image : model.images) {
-    const int lens = lens_of_camera.at(image.camera_id);
-    bundle.images.push_back({image.name, lens, image.cam_from_world,
-                             PrincipalPoint(model.cameras.at(image.camera_id)) -
+  for (size_t i = 0; i < names.size(); ++i) {
+    const int lens = lens_of_camera.at(camera_of_image[i]);
+    bundle.images.push_back({names[i], lens, cam_from_world[i],
+                             PrincipalPoint(cameras.at(camera_of_image[i])) -
                                  PrincipalPoint(bundle.lenses[static_cast<size_t>(lens)])});
   }
+}
+
+void AddSharedLenses(const SfmModel& model, Bundle& bundle) {
+  std::map<std::uint32_t, LensCamera> used;  // a lens without observations would be undetermined
+  std::vector<std::uint32_t> camera_of_image;
+  std::vector<std::string> names;
+  std::vector<Pose> poses;
+  for (const SfmImage& image : model.images) {
+    used.emplace(image.camera_id, model.cameras.at(image.camera_id));
+    camera_of_image.push_back(image.camera_id);
+    names.push_back(image.name);
+    poses.push_back(image.cam_from_world);
+  }
+  AddSharedLenses(used, camera_of_image, names, poses, bundle);
 }
 
 /// The image's camera: its lens, with its own principal point.
@@ -122,21 +136,22 @@ Bundle BundleOf(const SfmModel& model, bool separate_lenses) {
 Bundle BundleOf(std::span<const PinholeCamera> cameras, std::span<const Pose> cam_from_world,
                 std::span<const std::string> names, const SparseScene& scene) {
   Bundle bundle;
-  std::map<std::vector<double>, int> lens_of;
-  for (size_t i = 0; i < cameras.size(); ++i) {
-    const PinholeCamera& c = cameras[i];
+  std::map<std::uint32_t, LensCamera> distinct;
+  std::vector<std::uint32_t> camera_of_image;
+  for (const PinholeCamera& c : cameras) {
     const LensCamera lens{CameraModel::kPinhole,
                           c.width_px(),
                           c.height_px(),
                           {c.fx_px(), c.fy_px(), c.cx_px(), c.cy_px()}};
-    std::vector<double> key = lens.params;
-    key.push_back(c.width_px());
-    key.push_back(c.height_px());
-    const auto [at, made] =
-        lens_of.try_emplace(std::move(key), static_cast<int>(bundle.lenses.size()));
-    if (made) bundle.lenses.push_back(lens);
-    bundle.images.push_back({names[i], at->second, cam_from_world[i]});
+    const auto same = std::find_if(distinct.begin(), distinct.end(), [&](const auto& other) {
+      return other.second.params == lens.params && other.second.width_px == lens.width_px &&
+             other.second.height_px == lens.height_px;
+    });
+    camera_of_image.push_back(same != distinct.end() ? same->first
+                                                     : static_cast<std::uint32_t>(distinct.size()));
+    distinct.emplace(camera_of_image.back(), lens);
   }
+  AddSharedLenses(distinct, camera_of_image, names, cam_from_world, bundle);
   std::vector<Track> tracks(scene.points.size());
   for (const SparseObservation& o : scene.observations) {
     AddObservation(tracks.at(static_cast<size_t>(o.point)), o.view, o.pixel);

@@ -47,8 +47,8 @@ struct Bundle {
 /// that fewer than two images see are left out.
 Bundle BundleOf(const SfmModel& model, bool separate_lenses = false);
 
-/// The bundle of undistorted views. Views with equal cameras share one lens, since one lens made
-/// them. The lists belong together as in ValidateReprojection.
+/// The bundle of undistorted views. Views share what the images of a model share, since one lens
+/// made them. The lists belong together as in ValidateReprojection.
 Bundle BundleOf(std::span<const PinholeCamera> cameras, std::span<const Pose> cam_from_world,
                 std::span<const std::string> names, const SparseScene& scene);
 

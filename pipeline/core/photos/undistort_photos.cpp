@@ -39,14 +39,16 @@ std::vector<calib::LensCamera> StabilisedLenses(const capture::Capture& capture,
   return lenses;
 }
 
-// The pinhole camera that photos of a camera are drawn on. Those of one stabilised lens share one,
-// as they are resampled anyway; without distortion pixels stay as they are.
-PinholeCamera CameraToDrawOn(const calib::LensCamera& camera,
+// The pinhole camera that photos of a camera are drawn on: its own, so that nothing that a photo
+// shows is cut off. Held-out photos of a stabilised lens share one: a frame is compared where a lens
+// that nobody moved would have seen it.
+PinholeCamera CameraToDrawOn(const calib::LensCamera& camera, ViewRole role,
                              const std::vector<calib::LensCamera>& stabilised) {
+  if (role == ViewRole::kSource || camera.IsUndistorted()) return camera.Pinhole();
   const auto lens = std::find_if(stabilised.begin(), stabilised.end(), [&](const auto& other) {
     return calib::SameButForPrincipalPoint(other, camera);
   });
-  return lens == stabilised.end() || camera.IsUndistorted() ? camera.Pinhole() : lens->Pinhole();
+  return lens == stabilised.end() ? camera.Pinhole() : lens->Pinhole();
 }
 
 void RequireSize(const capture::Photo& photo, const calib::LensCamera& lens) {
@@ -87,7 +89,7 @@ std::vector<View> UndistortPhotos(const capture::Capture& capture,
     view.id = photo.id;
     view.name = photo.name;
     view.role = held_out[i] ? ViewRole::kHeldOut : ViewRole::kSource;
-    view.camera = calib::ShrunkCamera(CameraToDrawOn(lens, stabilised), options.max_size_px);
+    view.camera = calib::ShrunkCamera(CameraToDrawOn(lens, view.role, stabilised), options.max_size_px);
     view.cam_from_world = found->second->cam_from_world;
     views.push_back(std::move(view));
     photos.push_back(&photo);
@@ -103,8 +105,9 @@ std::vector<View> UndistortPhotos(const capture::Capture& capture,
     const capture::Photo& photo = *photos[begin + k];
     const calib::LensCamera& lens = model.cameras.at(registered.at(photo.name)->camera_id);
     const capture::PhotoPixels pixels = capture::ReadPhotoAndMask(photo);
-    calib::UndistortedPhoto flat = calib::Undistort(
-        pixels.image, pixels.mask, lens, CameraToDrawOn(lens, stabilised), options.max_size_px);
+    calib::UndistortedPhoto flat =
+        calib::Undistort(pixels.image, pixels.mask, lens,
+                         CameraToDrawOn(lens, view.role, stabilised), options.max_size_px);
     view.image = std::move(flat.image);
     view.mask = std::move(flat.mask);
     writer.WriteView(view, calibrated.unit);
