@@ -48,12 +48,12 @@ class UndistortPhotosTest : public ::testing::Test {
   }
 
   // As a run of `dtr build` does it, which ends here without a set.
-  std::vector<View> Run() {
+  std::vector<View> Run(const std::vector<bool>& held_out = std::vector<bool>(kPhotos, false)) {
     SilentProgress silent;
     io::SetWriter writer(folder_ / "set.dtr", "{}", false);
     std::vector<View> views =
-        UndistortPhotos(photos_, calibrated_, std::vector<bool>(kPhotos, false),
-                        {.max_size_px = kMaxSizePx, .memory_gb = 0}, writer, silent);
+        UndistortPhotos(photos_, calibrated_, held_out, {.max_size_px = kMaxSizePx, .memory_gb = 0},
+                        writer, silent);
     for (View& view : views) {
       EXPECT_TRUE(view.image.empty()) << view.name;
       io::LoadPixels(writer.folder(), view, {});
@@ -99,6 +99,23 @@ TEST_F(UndistortPhotosTest, AnotherCameraOrPoseOrADamagedImageIsDrawnAnew) {
   EXPECT_NO_THROW(Run());
   calibrated_.model.cameras[1].params[0] = 51;
   EXPECT_THROW(Run(), Error);
+}
+
+TEST_F(UndistortPhotosTest, OfAStabilisedLensSourcesKeepAllTheyShowAndHeldOutPhotosShareACamera) {
+  auto& cameras = calibrated_.model.cameras;
+  for (std::uint32_t id = 2; id <= kPhotos; ++id) {
+    cameras[id] = cameras.at(1);
+    calibrated_.model.images[id - 1].camera_id = id;
+  }
+  cameras[2].params[1] += 1;
+  cameras[3].params[2] += 1.5;
+  const std::vector<View> views = Run({false, false, true});
+  for (std::uint32_t id = 1; id < kPhotos; ++id) {
+    EXPECT_EQ(views[id - 1].camera, calib::ShrunkCamera(cameras.at(id).Pinhole(), kMaxSizePx));
+  }
+  calib::LensCamera mean = cameras.at(1);
+  mean.params[1] += 0.5;
+  EXPECT_EQ(views[2].camera, calib::ShrunkCamera(mean.Pinhole(), kMaxSizePx));
 }
 
 }  // namespace

@@ -40,8 +40,8 @@ std::vector<calib::LensCamera> StabilisedLenses(const capture::Capture& capture,
 }
 
 // The pinhole camera that photos of a camera are drawn on: its own, so that nothing that a photo
-// shows is cut off. Held-out photos of a stabilised lens share one: a frame is compared where a lens
-// that nobody moved would have seen it.
+// shows is cut off. Held-out photos of a stabilised lens share one: a frame is compared where a
+// lens that nobody moved would have seen it.
 PinholeCamera CameraToDrawOn(const calib::LensCamera& camera, ViewRole role,
                              const std::vector<calib::LensCamera>& stabilised) {
   if (role == ViewRole::kSource || camera.IsUndistorted()) return camera.Pinhole();
@@ -89,7 +89,8 @@ std::vector<View> UndistortPhotos(const capture::Capture& capture,
     view.id = photo.id;
     view.name = photo.name;
     view.role = held_out[i] ? ViewRole::kHeldOut : ViewRole::kSource;
-    view.camera = calib::ShrunkCamera(CameraToDrawOn(lens, view.role, stabilised), options.max_size_px);
+    view.camera =
+        calib::ShrunkCamera(CameraToDrawOn(lens, view.role, stabilised), options.max_size_px);
     view.cam_from_world = found->second->cam_from_world;
     views.push_back(std::move(view));
     photos.push_back(&photo);

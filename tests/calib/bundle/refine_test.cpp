@@ -133,6 +133,24 @@ TEST(Refine, GivesEveryImageItsPrincipalPointWhereTheLensIsStabilised) {
   EXPECT_FALSE(Refine(model, {}).changed);
 }
 
+TEST(BundleOf, ViewsOfAStabilisedLensShareIt) {
+  const Eigen::Vector2d at[] = {{320, 240}, {326, 240}, {323, 246}, {323, 234}};
+  std::vector<PinholeCamera> cameras;
+  for (const Eigen::Vector2d& centre : at) {
+    cameras.emplace_back(640, 480, 500, 500, centre.x(), centre.y());
+  }
+  cameras.emplace_back(640, 480, 700, 700, 320, 240);
+  const std::vector<std::string> names{"a", "b", "c", "d", "e"};
+  const Bundle bundle = BundleOf(cameras, std::vector<Pose>(5), names, {});
+  ASSERT_EQ(bundle.lenses.size(), 2u);
+  EXPECT_EQ(bundle.lenses[0].params, (std::vector<double>{500, 500, 323, 240}));
+  for (size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(bundle.images[i].lens, 0);
+    EXPECT_EQ(bundle.images[i].shift_px, at[i] - Eigen::Vector2d(323, 240)) << i;
+  }
+  EXPECT_EQ(bundle.images[4].lens, 1);
+}
+
 // So little that other faults of a lens model do as much: sure, and not worth a number per image.
 TEST(Refine, KeepsOnePrincipalPointWhereImagesGainNextToNothingByTheirOwn) {
   const Refined refined = Refine(ModelFrom(Stabilised(MakeBundle(Noisy()), 0.2)), {});
