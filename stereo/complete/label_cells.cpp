@@ -3,7 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <queue>
+#include <utility>
+#include <vector>
 
 namespace dtr::stereo {
 namespace {
@@ -13,10 +17,12 @@ constexpr std::array<std::array<int, 2>, kDirections> kSteps = {
     {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {-1, -1}, {1, -1}, {-1, 1}}};
 // Which candidate is which. A measured cell has one alone, its own plane, in the place of far.
 constexpr int kFirstDirection = 1, kFirstCarried = kFirstDirection + kDirections;
-constexpr int kCarried = 2, kFirstScenePlane = kFirstCarried + kCarried;
+constexpr int kCarried = 2, kByColour = kFirstCarried + kCarried, kFirstScenePlane = kByColour + 1;
 static_assert(kFirstScenePlane == kOwnLabels);
 constexpr float kSamePx = 2;  // cells of disparity: the same surface
 constexpr int kInset = 1;     // cells from a rim, where planes are taken from
+/// Levels of colour between neighbouring cells that make the way between them longer by a cell.
+constexpr float kLevelsPerCell = 3;
 
 /// Candidates of every cell: a plane each, and what it costs.
 class Candidates {
@@ -66,6 +72,7 @@ class Labelling {
     AddOwnOrFar();
     AddDirections();
     AddCarried();
+    AddNearestByColour();
     AddScenePlanes(planes);
     SetCosts();
   }
@@ -177,6 +184,34 @@ class Labelling {
       depths(x, y, 0) = here, slots[0] = *plane;
     } else if (here < near - kSamePx * view_.pixel && here > second) {
       depths(x, y, 1) = here, slots[1] = *plane;
+    }
+  }
+
+  /// Of the measured cell from which the way is shortest, where ways across edges of the image are
+  /// long: a surface without texture goes on to its outline, whatever shape it has.
+  void AddNearestByColour() {
+    using Way = std::pair<float, std::array<int, 4>>;  // its length; where it ends, where it began
+    std::priority_queue<Way, std::vector<Way>, std::greater<>> ways;
+    Grid<std::uint8_t> reached(columns_, rows_);
+    for (int y = 0; y < rows_; ++y) {
+      for (int x = 0; x < columns_; ++x) {
+        if (Measured(x, y)) ways.push({0.0F, {y, x, y, x}});
+      }
+    }
+    while (!ways.empty()) {
+      const auto [length, cells] = ways.top();
+      ways.pop();
+      const auto [y, x, from_y, from_x] = cells;
+      if (reached(x, y) != 0) continue;
+      reached(x, y) = 1;
+      if (!Measured(x, y)) candidates_.PlanesOf(x, y)[kByColour] = view_.PlaneAt(from_x, from_y);
+      for (int k = 0; k < 4; ++k) {
+        const int u = x + kSteps[static_cast<size_t>(k)][0],
+                  v = y + kSteps[static_cast<size_t>(k)][1];
+        if (!reached.Contains(u, v) || reached(u, v) != 0 || Measured(u, v)) continue;
+        ways.push(
+            {length + 1 + view_.Difference(x, y, u, v) / kLevelsPerCell, {v, u, from_y, from_x}});
+      }
     }
   }
 

@@ -9,8 +9,8 @@
 
 namespace dtr::stereo {
 
-/// Candidates of a cell beside the planes of the scene: far, eight directions, two of other views.
-inline constexpr int kOwnLabels = 11;
+/// Candidates of a cell beside the planes of the scene: far, eight directions, two of other views, by colour.
+inline constexpr int kOwnLabels = 12;
 
 /// What LabelCells weighs. Costs are in levels of sRGB.
 struct LabelWeights {
