@@ -21,8 +21,9 @@ constexpr int kCarried = 2, kByColour = kFirstCarried + kCarried, kFirstScenePla
 static_assert(kFirstScenePlane == kOwnLabels);
 constexpr float kSamePx = 2;  // cells of disparity: the same surface
 constexpr int kInset = 1;     // cells from a rim, where planes are taken from
-/// Levels of colour between neighbouring cells that make the way between them longer by a cell.
-constexpr float kLevelsPerCell = 3;
+/// Levels of colour between neighbouring cells that make the way between them longer by a cell;
+/// twice as many by four.
+constexpr float kLevelsPerCell = 6;
 
 /// Candidates of every cell: a plane each, and what it costs.
 class Candidates {
@@ -209,8 +210,8 @@ class Labelling {
         const int u = x + kSteps[static_cast<size_t>(k)][0],
                   v = y + kSteps[static_cast<size_t>(k)][1];
         if (!reached.Contains(u, v) || reached(u, v) != 0 || Measured(u, v)) continue;
-        ways.push(
-            {length + 1 + view_.Difference(x, y, u, v) / kLevelsPerCell, {v, u, from_y, from_x}});
+        const float levels = view_.Difference(x, y, u, v) / kLevelsPerCell;
+        ways.push({length + 1 + levels * levels, {v, u, from_y, from_x}});
       }
     }
   }
