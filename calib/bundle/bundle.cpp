@@ -65,7 +65,8 @@ Eigen::Vector2d PrincipalPoint(const LensCamera& lens) {
   return {lens.params[at], lens.params[at + 1]};
 }
 
-/// Images `names`, by the ids of their cameras; those of one LensGroup share its lens.
+/// Adds images that share a lens where their cameras are of one LensGroup. `camera_of_image`: ids
+/// in `cameras`, one per name and pose.
 void AddSharedLenses(const std::map<std::uint32_t, LensCamera>& cameras,
                      std::span<const std::uint32_t> camera_of_image,
                      std::span<const std::string> names, std::span<const Pose> cam_from_world,
@@ -136,6 +137,7 @@ Bundle BundleOf(const SfmModel& model, bool separate_lenses) {
 Bundle BundleOf(std::span<const PinholeCamera> cameras, std::span<const Pose> cam_from_world,
                 std::span<const std::string> names, const SparseScene& scene) {
   Bundle bundle;
+  std::map<std::vector<double>, std::uint32_t> id_of;
   std::map<std::uint32_t, LensCamera> distinct;
   std::vector<std::uint32_t> camera_of_image;
   for (const PinholeCamera& c : cameras) {
@@ -143,12 +145,11 @@ Bundle BundleOf(std::span<const PinholeCamera> cameras, std::span<const Pose> ca
                           c.width_px(),
                           c.height_px(),
                           {c.fx_px(), c.fy_px(), c.cx_px(), c.cy_px()}};
-    const auto same = std::find_if(distinct.begin(), distinct.end(), [&](const auto& other) {
-      return other.second.params == lens.params && other.second.width_px == lens.width_px &&
-             other.second.height_px == lens.height_px;
-    });
-    camera_of_image.push_back(same != distinct.end() ? same->first
-                                                     : static_cast<std::uint32_t>(distinct.size()));
+    std::vector<double> key = lens.params;
+    key.push_back(c.width_px());
+    key.push_back(c.height_px());
+    const auto id = static_cast<std::uint32_t>(distinct.size());
+    camera_of_image.push_back(id_of.try_emplace(std::move(key), id).first->second);
     distinct.emplace(camera_of_image.back(), lens);
   }
   AddSharedLenses(distinct, camera_of_image, names, cam_from_world, bundle);

@@ -45,7 +45,7 @@ void Average(const View& view, int cell_px, CellView& cells) {
       const auto known = sums.inverse_depths.size();
       const bool measured = 2 * known >= static_cast<size_t>(sums.usable);
       for (int c = 0; c < 3; ++c) {
-        // Of what was measured: beside an outline the rest is another surface.
+        // Mean of the measured pixels: beside an outline the others show another surface.
         const double mean = measured ? sums.measured_rgb[c] / static_cast<double>(known) / 255
                                      : sums.rgb[c] / sums.usable / 255;
         cells.colour(x, y, c) =

@@ -21,8 +21,8 @@ constexpr int kCarried = 2, kByColour = kFirstCarried + kCarried, kFirstScenePla
 static_assert(kFirstScenePlane == kOwnLabels);
 constexpr float kSamePx = 2;  // cells of disparity: the same surface
 constexpr int kInset = 1;     // cells from a rim, where planes are taken from
-/// Levels of colour between neighbouring cells that make the way between them longer by a cell;
-/// twice as many by four.
+/// Difference of colour, levels, at which a step between neighbouring cells is twice as long; the
+/// addition grows with its square.
 constexpr float kLevelsPerCell = 6;
 
 /// Candidates of every cell: a plane each, and what it costs.
@@ -188,20 +188,20 @@ class Labelling {
     }
   }
 
-  /// Of the measured cell from which the way is shortest, where ways across edges of the image are
-  /// long: a surface without texture goes on to its outline, whatever shape it has.
+  /// Adds the plane of the measured cell at the smallest geodesic distance, in which edges of the
+  /// image are long steps: a surface without texture continues to its outline, whatever its shape.
   void AddNearestByColour() {
-    using Way = std::pair<float, std::array<int, 4>>;  // its length; where it ends, where it began
-    std::priority_queue<Way, std::vector<Way>, std::greater<>> ways;
+    using Path = std::pair<float, std::array<int, 4>>;  // length; y, x of its end and of its start
+    std::priority_queue<Path, std::vector<Path>, std::greater<>> paths;
     Grid<std::uint8_t> reached(columns_, rows_);
     for (int y = 0; y < rows_; ++y) {
       for (int x = 0; x < columns_; ++x) {
-        if (Measured(x, y)) ways.push({0.0F, {y, x, y, x}});
+        if (Measured(x, y)) paths.push({0.0F, {y, x, y, x}});
       }
     }
-    while (!ways.empty()) {
-      const auto [length, cells] = ways.top();
-      ways.pop();
+    while (!paths.empty()) {
+      const auto [length, cells] = paths.top();
+      paths.pop();
       const auto [y, x, from_y, from_x] = cells;
       if (reached(x, y) != 0) continue;
       reached(x, y) = 1;
@@ -211,7 +211,7 @@ class Labelling {
                   v = y + kSteps[static_cast<size_t>(k)][1];
         if (!reached.Contains(u, v) || reached(u, v) != 0 || Measured(u, v)) continue;
         const float levels = view_.Difference(x, y, u, v) / kLevelsPerCell;
-        ways.push({length + 1 + levels * levels, {v, u, from_y, from_x}});
+        paths.push({length + 1 + levels * levels, {v, u, from_y, from_x}});
       }
     }
   }

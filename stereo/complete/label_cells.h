@@ -9,7 +9,8 @@
 
 namespace dtr::stereo {
 
-/// Candidates of a cell beside the planes of the scene: far, eight directions, two of other views, by colour.
+/// Candidates of a cell beside the planes of the scene: far, eight directions, two of other views,
+/// the one at the smallest geodesic distance.
 inline constexpr int kOwnLabels = 12;
 
 /// What LabelCells weighs. Costs are in levels of sRGB.

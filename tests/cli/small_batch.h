@@ -70,7 +70,7 @@ class Batch : public ::testing::Test {
   const TemporaryFolder folder_;
 };
 
-/// What lies beside a set while `dtr batch` makes it.
+/// A batch, with the folder that it keeps beside its set.
 class BatchFolder : public Batch {
  protected:
   std::filesystem::path Folder() const { return Set("a").string() + ".batch"; }
