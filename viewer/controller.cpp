@@ -2,17 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "dtr/base/order_statistics.h"
 #include "dtr/render/geometry.h"
+#include "dtr/render/opening_view.h"
 
 namespace dtr::viewer {
 namespace {
 
-constexpr double kRadPerWindow = std::numbers::pi;  // dragging across the image's longer side
-constexpr double kScrollFactor = 0.85;              // of the distance that is left after a step
-constexpr double kSpeedFactor = 1.25;               // per step of the wheel
+// Dragging across the image's longer side orbits by what the cameras span, but by no less.
+constexpr double kMinOrbitRad = std::numbers::pi / 8;
+constexpr double kScrollFactor = 0.85;  // of the distance that is left after a step
+constexpr double kSpeedFactor = 1.25;   // per step of the wheel
 constexpr double kSceneSizesPerSecond = 0.3;
 constexpr double kMinSpeedShare = 1e-4, kMaxSpeedShare = 100;  // of the scene's size per second
 constexpr double kGlideSeconds = 0.35;
@@ -88,13 +91,16 @@ Controller::Controller(Surroundings surroundings, const Eigen::Vector3d& up, int
     : surroundings_(std::move(surroundings)),
       depth_at_(std::move(depth_at)),
       up_(up),
+      lens_(3, 2, 3, 3, 1.5, 1),
+      orbit_rad_(std::max(CameraSpan(surroundings_.views, surroundings_.center), kMinOrbitRad)),
       fly_speed_(kSceneSizesPerSecond * SceneSize(surroundings_)) {
   if (surroundings_.views.empty()) {
-    camera_ = {FitLens({3, 2, 3, 3, 1.5, 1}, width_px, height_px), {}};
+    camera_ = {FillLens(lens_, width_px, height_px), {}};
     return;
   }
-  const View& first = *surroundings_.views.front();
-  camera_ = {FitLens(first.camera, width_px, height_px), first.cam_from_world};
+  const View& first = *surroundings_.views[OpeningView(surroundings_.views, surroundings_.center)];
+  lens_ = first.camera;
+  camera_ = {FillLens(lens_, width_px, height_px), first.cam_from_world};
   const auto& cameras = surroundings_.cameras;
   stepped_to_ =
       static_cast<size_t>(std::find(cameras.begin(), cameras.end(), &first) - cameras.begin());
@@ -134,7 +140,7 @@ void Controller::On(const MoveEvent& event) {
   const Eigen::Vector2d by = to - drag_->last_px;
   if (by.isZero(0)) return;
   const double rad_per_px =
-      kRadPerWindow / std::max(camera_.camera.width_px(), camera_.camera.height_px());
+      orbit_rad_ / std::max(camera_.camera.width_px(), camera_.camera.height_px());
   Pose& pose = camera_.cam_from_world;
   switch (drag_->button) {
     case Button::kLeft:
@@ -208,25 +214,27 @@ void Controller::Advance(double seconds) {
 }
 
 void Controller::Resize(int width_px, int height_px) {
-  camera_.camera = FitLens(camera_.camera, width_px, height_px);
+  const PinholeCamera lens = FillLens(lens_, width_px, height_px);
   if (glide_) {
-    glide_->from.camera = FitLens(glide_->from.camera, width_px, height_px);
-    glide_->to.camera = FitLens(glide_->to.camera, width_px, height_px);
+    glide_->from.camera = FillLens(glide_->from.camera, width_px, height_px);
+    glide_->to.camera = lens;
   }
+  camera_.camera = glide_ ? FillLens(camera_.camera, width_px, height_px) : lens;
 }
 
 void Controller::JumpTo(const NovelCamera& camera) {
   glide_.reset();
   drag_.reset();
-  camera_ = {FitLens(camera.camera, camera_.camera.width_px(), camera_.camera.height_px()),
+  lens_ = camera.camera;
+  camera_ = {FillLens(lens_, camera_.camera.width_px(), camera_.camera.height_px()),
              camera.cam_from_world};
 }
 
 void Controller::GoTo(const NovelCamera& camera) {
   drag_.reset();
-  const NovelCamera to{
-      FitLens(camera.camera, camera_.camera.width_px(), camera_.camera.height_px()),
-      camera.cam_from_world};
+  lens_ = camera.camera;
+  const NovelCamera to{FillLens(lens_, camera_.camera.width_px(), camera_.camera.height_px()),
+                       camera.cam_from_world};
   glide_ = Glide{camera_, to};
 }
 
@@ -254,8 +262,8 @@ void Controller::GoToNearestView() {
 }
 
 void Controller::ShowAll() {
-  GoTo({camera_.camera,
-        ViewAll(Foreground(surroundings_), PosesOf(surroundings_.views), up_, camera_.camera)});
+  const PinholeCamera lens = FillLens(lens_, camera_.camera.width_px(), camera_.camera.height_px());
+  GoTo({lens_, ViewAll(Foreground(surroundings_), PosesOf(surroundings_.views), up_, lens)});
 }
 
 std::optional<size_t> Controller::nearest_view() const {

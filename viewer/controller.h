@@ -40,12 +40,14 @@ class Controller {
   /// Plane z of what the image shows at a pixel; none where it shows nothing.
   using DepthAt = std::function<std::optional<double>(const Eigen::Vector2d& pixel)>;
 
-  /// Starts at the first source view's camera, or nowhere in particular without one. `up`: WorldUp,
-  /// unit length. Sizes in pixels.
+  /// Starts at the camera of OpeningView, or nowhere in particular without a source view. `up`:
+  /// WorldUp, unit length. Sizes in pixels.
   Controller(Surroundings surroundings, const Eigen::Vector3d& up, int width_px, int height_px,
              DepthAt depth_at);
 
   const NovelCamera& camera() const { return camera_; }
+  /// Intrinsics of the photo or file that it shows or glides to, before they fill the window.
+  const PinholeCamera& lens() const { return lens_; }
   /// Scene units per second.
   double fly_speed() const { return fly_speed_; }
   void set_fly_speed(double units_per_s);
@@ -104,7 +106,9 @@ class Controller {
   Surroundings surroundings_;
   const DepthAt depth_at_;
   const Eigen::Vector3d up_;
+  PinholeCamera lens_;  ///< of the photo or file that the camera shows or glides to
   NovelCamera camera_;
+  double orbit_rad_;  ///< by a drag across the image's longer side
   double fly_speed_;
   std::optional<Drag> drag_;
   std::optional<Glide> glide_;

@@ -25,7 +25,7 @@ std::vector<NovelCamera> Flight::Frames(const PinholeCamera& like) const {
     frames = PathThrough(keys_, static_cast<int>(keys_.size() - 1) * per_key + 1);
   }
   for (NovelCamera& frame : frames) {
-    frame.camera = FitLens(frame.camera, like.width_px(), like.height_px());
+    frame.camera = FillLens(frame.camera, like.width_px(), like.height_px());
   }
   return frames;
 }

@@ -27,8 +27,8 @@ double AllowedPitch(const Pose& cam_from_world, const Eigen::Vector3d& up, doubl
 
 }  // namespace
 
-PinholeCamera FitLens(const PinholeCamera& camera, int width_px, int height_px) {
-  const double scale = std::min(static_cast<double>(width_px) / camera.width_px(),
+PinholeCamera FillLens(const PinholeCamera& camera, int width_px, int height_px) {
+  const double scale = std::max(static_cast<double>(width_px) / camera.width_px(),
                                 static_cast<double>(height_px) / camera.height_px());
   const double right = camera.cx_px() - 0.5 * camera.width_px();
   const double down = camera.cy_px() - 0.5 * camera.height_px();

@@ -10,9 +10,10 @@
 
 namespace dtr::viewer {
 
-/// A camera for a window of this size that shows at least what `camera` shows: K is scaled by one
-/// factor for both axes and its principal point keeps its place relative to the middle.
-PinholeCamera FitLens(const PinholeCamera& camera, int width_px, int height_px);
+/// The camera of a window of this size with the widest field of view that shows nothing beyond
+/// `camera`: photos fill the window. K is scaled by one factor for both axes; its principal point
+/// keeps its place relative to the middle.
+PinholeCamera FillLens(const PinholeCamera& camera, int width_px, int height_px);
 
 /// A direction of the camera's in the world.
 Eigen::Vector3d AxisInWorld(const Pose& cam_from_world, const Eigen::Vector3d& axis_in_cam);

@@ -2,14 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "dtr/base/error.h"
+#include "dtr/base/order_statistics.h"
 
 namespace dtr {
 namespace {
 
-constexpr size_t kMaxKeys = 8;        // more keys make a path follow the photographer's steps
+constexpr size_t kFewKeys = 8;        // more make a path follow the photographer's steps
 constexpr size_t kMaxChained = 2048;  // chaining takes time by the square of their number
 constexpr int kStepsPerSegment = 64;  // of the table that evens out the speed
 
@@ -17,6 +19,7 @@ struct Key {
   const View* view;  ///< null: of no view
   Eigen::Vector3d center;
   Eigen::Quaterniond world_from_cam;
+  double scene_z = 0;  ///< depth of what the camera sees; 0: unknown
 };
 
 std::vector<Key> SourceKeys(const DtrSet& set) {
@@ -58,6 +61,26 @@ std::vector<Key> Thinned(std::vector<Key> keys, size_t max) {
   std::vector<Key> thinned;
   for (size_t i = 0; i < max; ++i) thinned.push_back(keys[i * (keys.size() - 1) / (max - 1)]);
   return thinned;
+}
+
+/// The longest piece of the chain whose steps are through free space.
+std::vector<Key> LongestFreePiece(const std::vector<Key>& chain, const FreeSpace& space) {
+  size_t begin = 0, best_begin = 0, best_size = 0;
+  for (size_t i = 0; i < chain.size(); ++i) {
+    if (i > 0 && !space.HasLine(chain[i - 1].center, chain[i].center)) begin = i;
+    if (i + 1 - begin > best_size) best_begin = begin, best_size = i + 1 - begin;
+  }
+  const auto first = chain.begin() + static_cast<std::ptrdiff_t>(best_begin);
+  return {first, first + static_cast<std::ptrdiff_t>(best_size)};
+}
+
+/// Median distance between neighbours of the chain; infinite for a single camera.
+double UsualStep(const std::vector<Key>& chain) {
+  std::vector<double> steps;
+  for (size_t i = 1; i < chain.size(); ++i) {
+    steps.push_back((chain[i].center - chain[i - 1].center).norm());
+  }
+  return steps.empty() ? std::numeric_limits<double>::infinity() : UpperMedian(steps);
 }
 
 /// Neighbouring quaternions in one half space: q and -q are the same rotation.
@@ -110,6 +133,16 @@ class Spline {
            (3 * u2 - 2 * u3) * keys_[i + 1].center + (u3 - u2) * width * Tangent(i + 1);
   }
 
+  /// Image motion between two parameters: translation as a share of the scene's depth, and
+  /// rotation; the distance alone where depth is unknown.
+  double Motion(double from, double to) const {
+    const double distance = (Position(to) - Position(from)).norm();
+    const auto [i, u] = Locate(to);
+    const double z = keys_[i].scene_z, next_z = keys_[i + 1].scene_z;
+    if (!(z > 0 && next_z > 0)) return distance;
+    return distance / (z * std::pow(next_z / z, u)) + Rotation(to).angularDistance(Rotation(from));
+  }
+
   Eigen::Quaterniond Rotation(double s) const {
     const auto [i, u] = Locate(s);
     const Eigen::Quaterniond along = keys_[i].world_from_cam.slerp(u, keys_[i + 1].world_from_cam);
@@ -152,14 +185,14 @@ class Spline {
   std::vector<double> knots_;
 };
 
-/// Spline parameters at even steps of the way travelled; even in the parameter where nothing moves.
+/// Spline parameters at even steps of image motion: translation as a share of the scene's depth,
+/// and rotation; even in the parameter where nothing moves.
 std::vector<double> EvenParameters(const Spline& spline, int frames) {
   const int steps = kStepsPerSegment * static_cast<int>(spline.segments());
   const auto parameter = [&](double step) { return step / kStepsPerSegment; };
   std::vector<double> way = {0};
   for (int i = 1; i <= steps; ++i) {
-    way.push_back(way.back() +
-                  (spline.Position(parameter(i)) - spline.Position(parameter(i - 1))).norm());
+    way.push_back(way.back() + spline.Motion(parameter(i - 1), parameter(i)));
   }
   std::vector<double> parameters;
   for (int f = 0; f < frames; ++f) {
@@ -178,10 +211,19 @@ std::vector<double> EvenParameters(const Spline& spline, int frames) {
   return parameters;
 }
 
+/// Through at most kFewKeys of the piece, more where fewer leave free space.
+Spline FreeSpline(const std::vector<Key>& piece, const FreeSpace& space) {
+  for (size_t keys = kFewKeys;; keys *= 2) {
+    const Spline spline(Thinned(piece, keys));
+    const int steps = 16 * static_cast<int>(spline.segments());
+    bool free = true;
+    for (int i = 0; i <= steps && free; ++i) free = space.Has(spline.Position(i / 16.0));
+    if (free || keys >= piece.size()) return spline;
+  }
+}
+
 /// All with one lens.
-std::vector<NovelCamera> Along(const std::vector<Key>& keys, const PinholeCamera& lens,
-                               int frames) {
-  const Spline spline(keys);
+std::vector<NovelCamera> Along(const Spline& spline, const PinholeCamera& lens, int frames) {
   std::vector<NovelCamera> path;
   for (const double s : EvenParameters(spline, frames)) {
     const Eigen::Quaterniond cam_from_world = spline.Rotation(s).conjugate();
@@ -197,14 +239,20 @@ void RequireFrames(int frames) {
 
 }  // namespace
 
-std::vector<NovelCamera> FlyThrough(const DtrSet& set, int frames) {
+std::vector<NovelCamera> FlyThrough(const DtrSet& set, int frames, const DepthLoader& load_depth) {
   RequireFrames(frames);
-  const std::vector<Key> keys = Thinned(Chain(Thinned(SourceKeys(set), kMaxChained)), kMaxKeys);
-  if (keys.size() == 1) {
+  std::vector<Key> chain = Chain(Thinned(SourceKeys(set), kMaxChained));
+  std::vector<const View*> views;
+  for (const Key& key : chain) views.push_back(key.view);
+  const FreeSpace space(views, UsualStep(chain), load_depth);
+  for (Key& key : chain) key.scene_z = space.SceneZ(key.center);
+  const std::vector<Key> piece = LongestFreePiece(chain, space);
+  const View& first = *piece.front().view;
+  if (piece.size() == 1) {
     return std::vector<NovelCamera>(static_cast<size_t>(frames),
-                                    {keys[0].view->camera, keys[0].view->cam_from_world});
+                                    {first.camera, first.cam_from_world});
   }
-  return Along(keys, keys.front().view->camera, frames);
+  return Along(FreeSpline(piece, space), first.camera, frames);
 }
 
 std::vector<NovelCamera> PathThrough(std::span<const NovelCamera> cameras, int frames) {
@@ -218,7 +266,7 @@ std::vector<NovelCamera> PathThrough(std::span<const NovelCamera> cameras, int f
     keys.push_back({nullptr, camera.cam_from_world.TargetOriginInSource(),
                     camera.cam_from_world.rotation.conjugate()});
   }
-  return Along(keys, cameras.front().camera, frames);
+  return Along(Spline(keys), cameras.front().camera, frames);
 }
 
 }  // namespace dtr

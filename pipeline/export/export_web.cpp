@@ -15,6 +15,7 @@
 #include "dtr/base/work_folder.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/validation_result.h"
+#include "dtr/render/opening_view.h"
 #include "dtr/render/scene.h"
 #include "pipeline/core/run/output_folder.h"
 #include "pipeline/evaluate/evaluate.h"
@@ -134,6 +135,12 @@ struct Source {
   Figures figures;
 };
 
+std::vector<const View*> ViewsOfFirstStep(const Source& source) {
+  std::vector<const View*> views;
+  for (size_t i = 0; i < source.views_of_step.front(); ++i) views.push_back(&source.views[i]);
+  return views;
+}
+
 Json TimeStepsJson(const Source& source) {
   Json steps = Json::array();
   for (size_t i = 0; i < source.views_of_step.size(); ++i) {
@@ -145,11 +152,14 @@ Json TimeStepsJson(const Source& source) {
 std::string SetJson(const std::string& name, const Source& source,
                     const std::vector<WebView>& packed) {
   const DtrSet& set = source.set;
+  const std::vector<const View*> views = ViewsOfFirstStep(source);
   Json json = {{"format", "dtr-web-page"},
                {"version", 2},
                {"name", name},
                {"unit", NameOf(set.unit)},
                {"scene_center", JsonOf(set.scene_center)},
+               {"opening_view", OpeningView(views, set.scene_center)},
+               {"camera_span_rad", CameraSpan(views, set.scene_center)},
                {"bounds", nullptr},
                {"validation", io::ValidationLine(set)},
                {"validation_failed", !io::ValidationWarning(set).empty()},
@@ -299,9 +309,10 @@ WebPageReport ExportWebPage(const WebPageRequest& request, Progress& progress) {
   const Files files = SmallEnough(request, source, work.path(), report, progress);
   if (!Fits(request, files)) {
     throw Error(fmt::format(
-        "`max_mb` {}: the smallest page of this set takes {:.2f} MB; leave views out with `dtr "
+        "`max_mb` {}: the smallest page of this set takes {:.3f} MB; leave views out with `dtr "
         "prune` first",
-        *request.max_mb, std::ceil(static_cast<double>(BytesOf(files)) / kBytesPerMb * 100) / 100));
+        *request.max_mb,
+        std::ceil(static_cast<double>(BytesOf(files)) / kBytesPerMb * 1000) / 1000));
   }
   Write(request, files, work.path());
   return report;

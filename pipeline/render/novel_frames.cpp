@@ -13,7 +13,9 @@
 #include "dtr/io/formats/npy.h"
 #include "dtr/io/formats/rgbd_capture.h"
 #include "dtr/io/formats/transforms_json.h"
+#include "dtr/io/set_io.h"
 #include "dtr/render/camera_path.h"
+#include "dtr/render/view_stream.h"
 #include "pipeline/core/cameras/camera_distortion.h"
 #include "pipeline/core/cameras/camera_formats.h"
 #include "pipeline/core/cameras/foreign_cameras.h"
@@ -120,6 +122,16 @@ std::vector<NovelFrame> FromFile(const DtrSet& set, const std::filesystem::path&
 
 }  // namespace
 
+DepthLoader DepthLoaderOf(const std::filesystem::path& set_folder) {
+  return [set_folder](View& view) {
+    try {
+      io::LoadPixels(set_folder, view, {.images = false, .completed = true});
+    } catch (const Error&) {
+      DropPixels(view);
+    }
+  };
+}
+
 PinholeCamera WithSize(const PinholeCamera& camera, const std::string& size) {
   if (size.empty()) return camera;
   const size_t x = size.find('x');
@@ -154,7 +166,8 @@ std::vector<NovelFrame> NovelFrames(const DtrSet& set, const NovelCameraRequest&
     cameras = FromFile(set, request.path_file, notes);
   } else if (request.fly_through_frames > 0) {
     int index = 0;
-    for (const NovelCamera& step : FlyThrough(set, request.fly_through_frames)) {
+    for (const NovelCamera& step :
+         FlyThrough(set, request.fly_through_frames, request.load_depth)) {
       cameras.push_back({fmt::format("{:06}", index++), step.camera, step.cam_from_world});
     }
   } else {

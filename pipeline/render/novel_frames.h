@@ -1,8 +1,10 @@
 // pipeline/render/novel_frames.h -- the cameras of a request to render.
 #pragma once
+#include <filesystem>
 #include <string>
 #include <vector>
 
+#include "dtr/render/free_space.h"
 #include "dtr/types/camera.h"
 #include "dtr/types/dtr_set.h"
 #include "dtr/types/pose.h"
@@ -23,6 +25,9 @@ struct NovelFrame {
 /// broken file.
 std::vector<NovelFrame> NovelFrames(const DtrSet& set, const NovelCameraRequest& request,
                                     std::vector<std::string>* notes = nullptr);
+
+/// Reads depth of the set in a folder; a view whose depth cannot be read stays without.
+DepthLoader DepthLoaderOf(const std::filesystem::path& set_folder);
 
 /// The camera at a size given as "WxH" (empty: its own). Throws UsageError for a malformed one.
 PinholeCamera WithSize(const PinholeCamera& camera, const std::string& size);

@@ -117,8 +117,10 @@ void WritePlanes(const RenderRequest& request, const RenderResult& result) {
 std::vector<NovelFrame> CamerasOf(const RenderRequest& request, const DtrSet& set,
                                   Progress& progress) {
   std::vector<std::string> notes;
+  NovelCameraRequest wanted = request.cameras;
+  if (!wanted.load_depth) wanted.load_depth = DepthLoaderOf(request.set);
   std::vector<NovelFrame> cameras =
-      NovelFrames(AtFrame(set, request.frame.value_or(0)), request.cameras, &notes);
+      NovelFrames(AtFrame(set, request.frame.value_or(0)), wanted, &notes);
   for (const std::string& note : notes) progress.Note(note);
   if (!request.play) return cameras;
   if (cameras.size() != 1 || request.frame) {

@@ -9,6 +9,7 @@
 
 #include "dtr/base/progress.h"
 #include "dtr/eval/held_out.h"
+#include "dtr/render/free_space.h"
 #include "dtr/render/options.h"
 
 namespace dtr::pipeline {
@@ -19,6 +20,7 @@ struct NovelCameraRequest {
   std::filesystem::path camera_file;  ///< cameras.json with one camera
   std::filesystem::path path_file;    ///< cameras.json with several
   int fly_through_frames = 0;         ///< a path along the set's own cameras
+  DepthLoader load_depth;             ///< for fly-throughs: depth of views not in memory
   std::string size;                   ///< "WxH"; 0 for either keeps the camera's proportions
 
   bool several() const { return !path_file.empty() || fly_through_frames > 0; }

@@ -15,6 +15,7 @@
 #include "dtr/base/files.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
+#include "dtr/render/opening_view.h"
 #include "tests/osg/osg_testing.h"
 #include "tests/support/environment.h"
 #include "tests/support/test_data.h"
@@ -127,14 +128,19 @@ class OsgViewerTest : public OsgTest {
     writer.Finish(named.set);
     set_ = io::LoadSet(folder_ / "scene.dtr");
   }
+  /// The view that viewers begin with, or `further` ones on.
+  const View& Opening(size_t further = 0) const {
+    std::vector<const View*> views;
+    for (const View& view : set_.frames[0].views) views.push_back(&view);
+    return *views[(OpeningView(views, set_.scene_center) + further) % views.size()];
+  }
   TemporaryFolder folder_;
   DtrSet set_;
 };
 
-TEST_F(OsgViewerTest, ShowsASetFromItsFirstCameraAndGoesOnToTheNext) {
-  const auto& views = set_.frames[0].views;
-  const RenderResult first = FromInputCamera(set_, views[0]);
-  const RenderResult second = FromInputCamera(set_, views[1]);
+TEST_F(OsgViewerTest, ShowsASetFromItsMiddleCameraAndGoesOnToTheNext) {
+  const RenderResult first = FromInputCamera(set_, Opening());
+  const RenderResult second = FromInputCamera(set_, Opening(1));
   const OsgViewerProgram program({(folder_ / "scene.dtr").string()});
   const auto shown = WaitFor(
       program, [&](const ImageRgb8& image) { return ShareOfEqual(image, first) > kEqualShare; });
@@ -150,7 +156,7 @@ TEST_F(OsgViewerTest, ShowsASetFromItsFirstCameraAndGoesOnToTheNext) {
 
 // As shells complete the names of folders.
 TEST_F(OsgViewerTest, ShowsASetWhoseNameEndsWithASlash) {
-  const RenderResult first = FromInputCamera(set_, set_.frames[0].views[0]);
+  const RenderResult first = FromInputCamera(set_, Opening());
   const OsgViewerProgram program({(folder_ / "scene.dtr").string() + "/"});
   EXPECT_TRUE(WaitFor(program, [&](const ImageRgb8& image) {
     return ShareOfEqual(image, first) > kEqualShare;
@@ -165,7 +171,7 @@ TEST_F(OsgViewerTest, FindsASetOnItsPathAndDrawsItAsItWasPrunedFor) {
   RenderOptions pruned;
   pruned.method = RenderMethod::kTwoPass;
   pruned.resolution = 12;
-  const View& view = set_.frames[0].views[0];
+  const View& view = Opening();
   const RenderResult coarse = FromInputCamera(set_, view, pruned);
   ASSERT_LT(ShareOfEqual(FromInputCamera(set_, view).image, coarse), 0.9);
   const Environment path("OSG_FILE_PATH", folder_.path().string());
@@ -183,7 +189,7 @@ TEST_F(OsgViewerTest, ShowsASetAndAModel) {
   model->addDrawable(box);
   model->getOrCreateStateSet()->setMode(GL_LIGHTING, osg::StateAttribute::OFF);
   ASSERT_TRUE(osgDB::writeNodeFile(*model, (folder_ / "model.osgt").string()));
-  const RenderResult alone = FromInputCamera(set_, set_.frames[0].views[0]);
+  const RenderResult alone = FromInputCamera(set_, Opening());
   const OsgViewerProgram program(
       {(folder_ / "scene.dtr").string(), (folder_ / "model.osgt").string()});
   const auto shown = WaitFor(program, [&](const ImageRgb8& image) {

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include "datasets/exact/analytic_scene.h"
 #include "dtr/base/error.h"
@@ -81,6 +83,93 @@ TEST(FlyThrough, OfVeryManyViewsStillRunsFromOneEndToTheOther) {
   for (const NovelCamera& camera : path) {
     EXPECT_NEAR(camera.cam_from_world.TargetOriginInSource().norm(), 10, 0.05);
   }
+}
+
+/// A view from `center` to the origin of what a ball there and a wall behind it look like.
+View ViewOfABall(const std::string& id, const Eigen::Vector3d& center, double radius) {
+  View view;
+  view.id = id;
+  view.camera = PinholeCamera(64, 48, 60, 60, 32, 24);
+  view.cam_from_world = LookAt(center, {0, 0, 0});
+  view.depth = DepthImage(64, 48);
+  const double distance = center.norm();
+  for (int y = 0; y < 48; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      const Eigen::Vector3d ray = view.camera.RayFromPixel({x + 0.5, y + 0.5}).normalized();
+      const double middle =
+          ray.z() * distance;  // along the ray to where it is nearest to the origin
+      const double half = radius * radius - distance * distance + middle * middle;
+      const double along = half > 0 ? middle - std::sqrt(half) : 40 / ray.z();
+      view.depth(x, y) = static_cast<float>(along * ray.z());
+    }
+  }
+  return view;
+}
+
+DtrSet Around(const std::vector<double>& angles, double radius) {
+  DtrSet set;
+  set.frames.resize(1);
+  for (const double angle : angles) {
+    set.frames[0].views.push_back(
+        ViewOfABall("v" + std::to_string(100 + set.frames[0].views.size()),
+                    {10 * std::sin(angle), 0, -10 * std::cos(angle)}, radius));
+  }
+  return set;
+}
+
+TEST(FlyThrough, DoesNotPassThroughASurface) {
+  // Five cameras before a ball and three behind it: the chain leads from these to those through it.
+  DtrSet set = Around({-0.4, -0.2, 0, 0.2, 0.4, 3.0, 3.14, 3.28}, 3);
+  for (const NovelCamera& camera : FlyThrough(set, 40)) {
+    EXPECT_LT(camera.cam_from_world.TargetOriginInSource().z(), -9);
+  }
+  // The same by what a loader reads.
+  std::map<std::string, DepthImage> stored;
+  for (View& view : set.frames[0].views) stored[view.id] = std::exchange(view.depth, {});
+  for (const NovelCamera& camera :
+       FlyThrough(set, 40, [&](View& view) { view.depth = stored.at(view.id); })) {
+    EXPECT_LT(camera.cam_from_world.TargetOriginInSource().z(), -9);
+  }
+  double farthest_z = -10;
+  for (const NovelCamera& camera : FlyThrough(set, 40)) {
+    farthest_z = std::max(farthest_z, camera.cam_from_world.TargetOriginInSource().z());
+  }
+  EXPECT_GT(farthest_z, 9) << "without depth nothing is known of the ball";
+}
+
+TEST(FlyThrough, TakesMoreKeysWhereFewerWouldCutThroughASurface) {
+  std::vector<double> ring;
+  for (int i = 0; i < 100; ++i) ring.push_back(2 * M_PI * i / 100);
+  const auto least_norm = [](const DtrSet& set) {
+    double least = 10;
+    for (const NovelCamera& camera : FlyThrough(set, 200)) {
+      least = std::min(least, camera.cam_from_world.TargetOriginInSource().norm());
+    }
+    return least;
+  };
+  EXPECT_LT(least_norm(Around(ring, 3)), 9.3) << "eight keys cut corners, where there is room";
+  EXPECT_GT(least_norm(Around(ring, 9.4)), 10 - 2 * M_PI * 10 / 100);
+}
+
+TEST(FlyThrough, IsSlowerWhereTheSceneIsNearer) {
+  DtrSet set;
+  set.frames.resize(1);
+  for (int i = 0; i < 8; ++i) {
+    View view = ViewOfABall("v" + std::to_string(i), {static_cast<double>(i), 0, -10}, 0);
+    view.cam_from_world = {Eigen::Quaterniond::Identity(), {-static_cast<double>(i), 0, 10}};
+    for (int y = 0; y < 48; ++y) {
+      for (int x = 0; x < 64; ++x) view.depth(x, y) = i < 4 ? 2 : 8;
+    }
+    set.frames[0].views.push_back(view);
+  }
+  const std::vector<NovelCamera> path = FlyThrough(set, 101);
+  const auto step = [&](size_t i) {
+    return (path[i + 1].cam_from_world.TargetOriginInSource() -
+            path[i].cam_from_world.TargetOriginInSource())
+        .norm();
+  };
+  const double near = std::min(step(5), step(95)), far = std::max(step(5), step(95));
+  EXPECT_NEAR(far / near, 4, 0.2);
 }
 
 TEST(FlyThrough, OddCases) {

@@ -2,7 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 #include "dtr/base/random.h"
+#include "dtr/render/geometry.h"
+#include "dtr/render/opening_view.h"
 
 namespace dtr::viewer {
 namespace {
@@ -45,7 +49,18 @@ class ControllerTest : public ::testing::Test {
   std::optional<double> depth_ = 10;
 };
 
-TEST_F(ControllerTest, BeginsAtTheFirstInputCameraAndStepsThroughThemInOrder) {
+TEST_F(ControllerTest, BeginsInTheMiddleOfTheCamerasThatLookAtTheScene) {
+  const Surroundings four = SurroundingsOf(set_);
+  EXPECT_EQ(four.views[OpeningView(four.views, four.center)]->id,
+            "b");  // of the two in the middle, the nearer one
+  // Where that one looks away from the scene it is another.
+  View& b = set_.frames[0].views[2];
+  b.cam_from_world = LookAlong(b.CenterInWorld(), Eigen::Vector3d(0, 0, -1), kUp);
+  const Surroundings turned = SurroundingsOf(set_);
+  EXPECT_NE(turned.views[OpeningView(turned.views, turned.center)]->id, "b");
+}
+
+TEST_F(ControllerTest, BeginsAtAnInputCameraAndStepsThroughThemInOrder) {
   Controller controller = Make();
   EXPECT_EQ(controller.surroundings().views.size(), 4u);  // not the held-out one
   EXPECT_EQ(controller.surroundings().cameras.size(), 5u);
@@ -58,22 +73,50 @@ TEST_F(ControllerTest, BeginsAtTheFirstInputCameraAndStepsThroughThemInOrder) {
     Wait(controller, 1);
     EXPECT_FALSE(controller.moving());
   }
-  EXPECT_EQ(visited, "abcd`") << "from the first source view, by the held-out one, and round";
+  EXPECT_EQ(visited, "bcd`a") << "from the opening view, by the held-out one, and on";
   controller.StepViews(-2);
   Wait(controller, 1);
-  EXPECT_EQ(controller.at_view(), 4u);
+  EXPECT_EQ(controller.at_view(), 0u);
   // Steps asked for while on the way add up.
   controller.StepViews(1);
   controller.Advance(0.05);
   controller.StepViews(1);
   Wait(controller, 1);
-  EXPECT_EQ(controller.at_view(), 1u);
-  EXPECT_EQ(controller.camera().camera, FitLens(set_.frames[0].views[0].camera, 640, 400));
+  EXPECT_EQ(controller.at_view(), 2u);
+  EXPECT_EQ(controller.camera().camera, FillLens(set_.frames[0].views[0].camera, 640, 400));
+}
+
+TEST_F(ControllerTest, ThePhotoFillsTheWindowHoweverOftenThatChanges) {
+  Controller controller = Make();
+  const PinholeCamera photo = set_.frames[0].views[0].camera;
+  for (const auto& [width, height] : {std::pair(200, 700), {1200, 100}, {640, 400}}) {
+    controller.Resize(width, height);
+    EXPECT_EQ(controller.camera().camera, FillLens(photo, width, height));
+  }
+}
+
+TEST_F(ControllerTest, ADragAcrossTheWindowOrbitsAsFarAsThePhotosSpan) {
+  for (const double apart : {1.0, 4.0}) {
+    for (size_t i = 0; i < 5; ++i) {
+      const Eigen::Vector3d center(apart * (static_cast<double>(i) - 1.5), 0, -10);
+      set_.frames[0].views[i].cam_from_world = LookAlong(center, -center, kUp);
+    }
+    Controller controller = Make();
+    const double span =
+        CameraSpan(controller.surroundings().views, controller.surroundings().center);
+    EXPECT_NEAR(span, 2 * std::atan2(1.5 * apart, 10), kSame);
+    const Eigen::Vector3d from = Center(controller);
+    const Eigen::Vector3d pivot = WorldPoint(controller.camera(), {0, 200}, *depth_);
+    controller.Handle(ButtonEvent{Button::kLeft, true, 0, 200});
+    controller.Handle(MoveEvent{kWidthPx, 200});
+    EXPECT_NEAR(AngleBetween(from - pivot, Center(controller) - pivot),
+                std::max(span, std::numbers::pi / 8), 1e-6);
+  }
 }
 
 TEST_F(ControllerTest, AHeldOutCameraIsReachedButNotTakenForASourceView) {
   Controller controller = Make();
-  controller.StepViews(-1);
+  controller.StepViews(-2);
   Wait(controller, 1);
   ASSERT_EQ(controller.at_view(), 0u);
   EXPECT_EQ(controller.surroundings().cameras[0]->role, ViewRole::kHeldOut);

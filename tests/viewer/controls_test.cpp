@@ -179,8 +179,8 @@ std::vector<Controls::Row> Controls::InspectRows() {
 std::vector<Controls::Row> Controls::WhereRows() {
   return {
       {"Where", [this] { Fold("Where", "nearest"); }},
-      {"next", [this] { ClickUntilItIs("next", "at_view", "0001.jpg"); }},
-      {"previous", [this] { ClickUntilItIs("previous", "at_view", "0000.jpg"); }},
+      {"next", [this] { ClickUntilItIs("next", "at_view", "0003.jpg"); }},
+      {"previous", [this] { ClickUntilItIs("previous", "at_view", "0002.jpg"); }},
       {"view all", [this] { ClickUntilItIs("view all", "at_view", ""); }},
       {"nearest",
        [this] { ClickUntil("nearest", [](const Json& s) { return s["at_view"] != ""; }); }},

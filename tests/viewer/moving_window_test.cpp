@@ -23,7 +23,7 @@ TEST_F(MovingWindowTest, BeginsAtAnyTimeStepAndShowsWhatRenderShows) {
 }
 
 TEST_F(MovingWindowTest, WhatIsLeftOutOfOneTimeStepIsLeftOutOfAll) {
-  Open(96, 64, {"--no-panel"});
+  Open(96, 64, {"--no-panel", "--like", "0000"});
   if (IsSkipped()) return;
   Do({"mousemove", "40", "30", "key", "h"});
   Wait("a view left out", [](const Json& s) { return s["hidden"] == Json::array({"0000.jpg"}); });

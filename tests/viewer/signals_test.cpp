@@ -99,7 +99,7 @@ TEST_F(ViewerSignals, AVideoThatIsBeingRecordedLeavesNothingBehind) {
   ViewerProgram::Do({"mousemove", "150", "120", "key", "k"});
   viewer.WaitFor("a camera of a path", [](const Json& s) { return s["path_keys"] == 1; });
   ViewerProgram::Do({"key", "Right"});
-  viewer.WaitFor("the next view", [](const Json& s) { return s["at_view"] == "0002.jpg"; });
+  viewer.WaitFor("the next view", [](const Json& s) { return s["at_view"] == "0004.jpg"; });
   ViewerProgram::Do({"key", "k"});
   viewer.WaitFor("a path", [](const Json& s) { return s["path_keys"] == 2; });
   const auto before = Contents(folder_ / "saved");

@@ -32,7 +32,7 @@ TEST_F(ViewerWindow, TheCommandLineOfAPrunedSetSaysWhatDiffersFromItsOwnOptions)
                          {{"--views", "8", "--fill-holes=false", "--absolute-delta", "0"},
                           {"--views 8", "--fill-holes=false", "--absolute-delta 0"}}}) {
     const TemporaryFolder folder;
-    std::vector<std::string> args{"--size", "320x240", "--no-panel"};
+    std::vector<std::string> args{"--size", "320x240", "--no-panel", "--like", "0001"};
     args.insert(args.end(), one.options.begin(), one.options.end());
     ViewerProgram viewer(set, folder.path(), args);
     viewer.WaitFor("the first image", Anything);
@@ -113,9 +113,9 @@ TEST_F(ViewerWindow, TheCommandLineSaysWhatItDoesNotDraw) {
 TEST_F(ViewerWindow, PhotosAreThereOfHiddenAndHeldOutViewsToo) {
   NeedDisplay();
   if (IsSkipped()) return;
-  ViewerProgram viewer(
-      Set(), folder_.path(),
-      {"--size", "320x240", "--no-panel", "--photo", "--cameras", "--exclude", "0001"});
+  ViewerProgram viewer(Set(), folder_.path(),
+                       {"--size", "320x240", "--no-panel", "--photo", "--cameras", "--exclude",
+                        "0001", "--like", "0001"});
   const Json start =
       viewer.WaitFor("its photo", [](const Json& s) { return s["photo"] == "0001.jpg"; });
   EXPECT_EQ(start["hidden"], Json::array({"0001.jpg"})) << "left out, and to be taken in again";
@@ -226,7 +226,8 @@ TEST_F(ViewerWindow, ACommaInANameEndsItInNoCommandLine) {
     if (view["name"] == "0001.jpg") view["name"] = "one, and only.jpg";
   }
   WriteFileAtomically(set / "set.json", json.dump());
-  ViewerProgram viewer(set, folder_.path(), {"--size", "320x240", "--no-panel"});
+  ViewerProgram viewer(set, folder_.path(),
+                       {"--size", "320x240", "--no-panel", "--like", "one, and only.jpg"});
   viewer.WaitFor("the first image", Anything);
   ViewerProgram::Do({"mousemove", "160", "120", "key", "h"});
   viewer.WaitFor("a view left out", [](const Json& s) { return s["hidden"].size() == 1; });

@@ -17,18 +17,18 @@ TEST_F(ViewerWindow, KeysDragsAndTheWheelMoveTheCamera) {
   if (IsSkipped()) return;
   ViewerProgram viewer(Set(), folder_.path(), {"--size", "600x400", "--no-panel"});
   const Json start = viewer.WaitFor("the first image", Anything);
-  EXPECT_EQ(start["at_view"], "0001.jpg");  // 0000 is held out
+  EXPECT_EQ(start["at_view"], "0003.jpg") << "the camera in the middle";
   EXPECT_EQ(start["width_px"], 600);
   EXPECT_GT(start["coverage"], 0.5);
   EXPECT_EQ(start["divisor"], 1);
 
   ViewerProgram::Do({"mousemove", "300", "220", "key", "Right"});
   const Json next = viewer.WaitFor("the next input camera",
-                                   [](const Json& s) { return s["at_view"] == "0002.jpg"; });
+                                   [](const Json& s) { return s["at_view"] == "0004.jpg"; });
   EXPECT_GT(Moved(start, next), 0.01);
   ViewerProgram::Do({"key", "Left"});
   viewer.WaitFor("the input camera before",
-                 [](const Json& s) { return s["at_view"] == "0001.jpg"; });
+                 [](const Json& s) { return s["at_view"] == "0003.jpg"; });
 
   ViewerProgram::Do(
       {"mousedown", "1", "mousemove", "340", "230", "mousemove", "380", "240", "mouseup", "1"});
@@ -92,7 +92,8 @@ TEST_F(ViewerWindow, APathIsRecordedThatRenderAndViewRead) {
   if (IsSkipped()) return;
   const std::string path = In("good-path-001.json");
   {
-    ViewerProgram viewer(Set(), folder_.path(), {"--size", "320x240", "--no-panel"});
+    ViewerProgram viewer(Set(), folder_.path(),
+                         {"--size", "320x240", "--no-panel", "--like", "0001"});
     viewer.WaitFor("the first image", Anything);
     ViewerProgram::Do({"mousemove", "150", "120", "key", "k"});
     viewer.WaitFor("a path", [&](const Json&) { return fs::exists(path); });
@@ -164,7 +165,7 @@ TEST_F(ViewerWindow, TheSetOnTheDiskIsReadAnewAndItsLossIsNoCrash) {
   fs::copy(Set(), set, fs::copy_options::recursive);
   // Filling would keep the photos in memory.
   ViewerProgram viewer(set, folder_.path(),
-                       {"--size", "320x240", "--no-panel", "--fill-holes=false"});
+                       {"--size", "320x240", "--no-panel", "--fill-holes=false", "--like", "0001"});
   viewer.WaitFor("the first image", Anything);
   ViewerProgram::Do({"mousemove", "150", "120", "key", "Right"});
   viewer.WaitFor("another view", [](const Json& s) { return s["at_view"] == "0002.jpg"; });
@@ -206,7 +207,8 @@ TEST_F(ViewerWindow, TheSetOnTheDiskIsReadAnewAndItsLossIsNoCrash) {
 TEST_F(ViewerWindow, WhatIsInspectedIsSaid) {
   NeedDisplay();
   if (IsSkipped()) return;
-  ViewerProgram viewer(Set(), folder_.path(), {"--size", "400x300", "--no-panel"});
+  ViewerProgram viewer(Set(), folder_.path(),
+                       {"--size", "400x300", "--no-panel", "--like", "0001"});
   viewer.WaitFor("the first image", Anything);
   ViewerProgram::Do({"mousemove", "200", "200", "key", "g"});
   const Json probed = viewer.WaitFor("figures under the cursor",

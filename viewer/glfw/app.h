@@ -39,7 +39,7 @@ struct AppSettings {
   /// Cameras to fly along at once, one a frame, as while moving; empty: none.
   std::vector<NovelCamera> play;
   int laps = 1;                      ///< so many times
-  std::optional<NovelCamera> start;  ///< none: the first input camera
+  std::optional<NovelCamera> start;  ///< none: OpeningView
   size_t time_step = 0;              ///< of a dynamic set: the frame shown first
   bool play_time = false;            ///< of a dynamic set: from there on
   int frames = 0;                    ///< close after so many, once the image is whole; 0: never

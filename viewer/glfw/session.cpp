@@ -40,7 +40,9 @@ Session::Session(const AppSettings& settings, const Host& host, const Tell& tell
 Eigen::Vector3d Session::ContinueFrom(const Session& before) {
   // Stored worlds are relative to their sets' origins.
   const Eigen::Vector3d shift = opened_->set.world_origin - before.opened_->set.world_origin;
-  controller.JumpTo(InMovedWorld(before.controller.camera(), shift));
+  NovelCamera there = InMovedWorld(before.controller.camera(), shift);
+  there.camera = before.controller.lens();
+  controller.JumpTo(there);
   controller.set_fly_speed(before.controller.fly_speed());
   Inspection& mine = inspector.inspection();
   const Inspection& theirs = before.inspector.inspection();

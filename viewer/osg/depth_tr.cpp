@@ -11,6 +11,7 @@
 #include "dtr/base/error.h"
 #include "dtr/cpu/renderer.h"
 #include "dtr/io/image_io.h"
+#include "dtr/render/opening_view.h"
 #include "dtr/render/valid_views.h"
 #include "viewer/osg/dtr_drawable.h"
 #include "viewer/osg/novel_camera.h"
@@ -178,6 +179,13 @@ const InputView& DepthTR::At(int vn) const { return const_cast<DepthTR*>(this)->
 
 osg::Matrixd DepthTR::getInputViewMatrix(int vn) const {
   return ViewMatrixOf(At(vn).view().cam_from_world);
+}
+
+int DepthTR::openingView() const {
+  if (input_views_.empty()) return -1;
+  std::vector<const dtr::View*> views;
+  for (const InputView& input : input_views_) views.push_back(&input.view());
+  return static_cast<int>(dtr::OpeningView(views, getScene()->scene.center));
 }
 
 int DepthTR::nextView(int step) {

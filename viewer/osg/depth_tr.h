@@ -101,6 +101,8 @@ class DepthTR : public osg::Geode {
   int nextView(int step = 1);
   /// The one that nextView went to last; -1 before.
   int currentView() const { return current_view_; }
+  /// The one to begin with, in the middle of the others (dtr::OpeningView); -1 without a set.
+  int openingView() const;
 
   // The report's operations: by the reference renderer (dtr/cpu); no graphics context is needed.
 

@@ -205,7 +205,7 @@ bool KeyHandler::handle(const osgGA::GUIEventAdapter& event, osgGA::GUIActionAda
   fellows->Join(this);
   if (type == osgGA::GUIEventAdapter::FRAME) {
     if (std::exchange(starts_at_input_, false) && fellows->TakeStart(this)) {
-      GoTo(node->nextView(), event, viewer);
+      GoTo(node->nextView(node->openingView() - node->currentView()), event, viewer);
     }
     return false;
   }

@@ -14,7 +14,7 @@ namespace osgDTR {
 /// change for all their nodes, and n N go through the input views of one after those of the other.
 class KeyHandler : public osgGA::GUIEventHandler {
  public:
-  /// `starts_at_input`: home, which is where viewers start, becomes the first input camera.
+  /// `starts_at_input`: home, which is where viewers start, becomes DepthTR::openingView().
   explicit KeyHandler(DepthTR* node, bool starts_at_input = false);
 
   using osgGA::GUIEventHandler::handle;

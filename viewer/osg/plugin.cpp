@@ -22,7 +22,7 @@ struct PluginOptions {
   FillTime fill_time = FillTime::kAlways;
   int time_step = 0;  ///< of a dynamic set: the first to be shown
   bool play = false;  ///< from there on
-  bool keys = true;   ///< the report's keys, and the first input camera as home
+  bool keys = true;   ///< the report's keys, and the input camera in the middle as home
 };
 
 int WholeNumber(const std::string& name, const std::string& value) {

@@ -43,6 +43,10 @@ if (found.problem === "") {
   await page.mouse.move(190, 78, { steps: 3 });
   await page.mouse.up();
   found.orbits = (await camera()) !== start;
+  Object.assign(found, await page.evaluate(() => {
+    const { set } = globalThis.dtrPage;
+    return { next: `${(set.opening + 1) % set.views.length + 1} / ` };
+  }));
   await page.keyboard.press(".");
   await page.waitForFunction(() => globalThis.dtrPage.navigation.jump === null);
   found.photo = await page.evaluate(() => document.getElementById("photo").textContent);

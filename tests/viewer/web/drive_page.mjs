@@ -72,6 +72,10 @@ if (await page.evaluate(() => globalThis.dtrPage !== undefined)) {
     await fingers("touchEnd");
     found.twoFingers = (await camera()) !== pinched;
 
+    Object.assign(found, await page.evaluate(() => {
+      const { set, navigation } = globalThis.dtrPage;
+      return { photoAtStart: navigation.photo, span: set.span, next: `${(set.opening + 1) % set.views.length + 1} / ` };
+    }));
     await page.keyboard.press("Period");
     await page.waitForFunction(() => globalThis.dtrPage.navigation.jump === null);
     found.photo = await page.evaluate(() => document.getElementById("photo").textContent);
@@ -91,6 +95,14 @@ if (await page.evaluate(() => globalThis.dtrPage !== undefined)) {
     await drawn();
     found.distance = await page.evaluate(() => document.querySelector("#marks text")?.textContent ?? "");
     await look("distance");
+
+    await page.setViewportSize({ width: 390, height: 844 });  // a phone held upright
+    found.outside = await page.evaluate(() => [...document.querySelectorAll("nav > *")]
+      .filter((element) => !element.hidden)
+      .filter((element) => {
+        const box = element.getBoundingClientRect();
+        return box.left < 0 || box.right > innerWidth || box.bottom > innerHeight;
+      }).map((element) => element.textContent));
   }
 } else {
   found.problem = await problemOf(page);

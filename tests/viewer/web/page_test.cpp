@@ -9,6 +9,7 @@
 #include "dtr/cpu/renderer.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
+#include "dtr/render/opening_view.h"
 #include "dtr/types/inverse_depth_code.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/cli/web_page_bytes.h"
@@ -60,7 +61,16 @@ TEST_F(WebPage, ShowsTheSceneAndDoesWhatMouseKeysAndFingersAsk) {
   for (const char* what : {"orbits", "dollies", "flies", "oneFinger", "twoFingers"}) {
     EXPECT_EQ(found[what], true) << what;
   }
-  EXPECT_THAT(found["photo"].get<std::string>(), HasSubstr("2 / "));
+  const DtrSet set = io::ReadSet(folder_ / "set.dtr");
+  std::vector<const View*> views;
+  for (const View& view : set.frames[0].views) {
+    if (view.role == ViewRole::kSource) views.push_back(&view);
+  }
+  std::sort(views.begin(), views.end(), [](const View* a, const View* b) { return a->id < b->id; });
+  EXPECT_EQ(found["photoAtStart"], OpeningView(views, set.scene_center));
+  EXPECT_EQ(found["span"], CameraSpan(views, set.scene_center));
+  EXPECT_THAT(found["photo"].get<std::string>(), HasSubstr(found["next"].get<std::string>()));
+  EXPECT_THAT(found["outside"], IsEmpty()) << "buttons on a phone: " << found["outside"];
   EXPECT_EQ(found["compares"], "true");
   EXPECT_THAT(found["distance"].get<std::string>(), EndsWith(" m"));  // the set is metric
 }

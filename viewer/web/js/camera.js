@@ -34,9 +34,9 @@ export const rayOf = (camera, [x, y]) => [(x - camera.cx) / camera.fx, (y - came
 /** The point of the world at plane depth z behind a pixel. */
 export const pointAt = (camera, pixel, z) => add(times(transposed(camera.matrix), scaled(rayOf(camera, pixel), z)), camera.centre);
 
-/** The same camera for a canvas of another size: all of the photo, as large as it fits. */
-export function fitted(photo, width, height) {
-  const scale = Math.min(width / photo.width, height / photo.height);
+/** The same camera for a canvas of another size, which the photo fills. */
+export function filling(photo, width, height) {
+  const scale = Math.max(width / photo.width, height / photo.height);
   return {
     width, height, fx: photo.fx * scale, fy: photo.fy * scale,
     cx: width / 2 + (photo.cx - photo.width / 2) * scale, cy: height / 2 + (photo.cy - photo.height / 2) * scale,

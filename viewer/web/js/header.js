@@ -110,6 +110,9 @@ export function parseHeader(text) {
   return {
     name: words(json.name, "set.name"), unit: words(json.unit, "set.unit"), bounds,
     center: numbers(json.scene_center, 3, "set.scene_center"),
+    // Pages exported before 0.2 have neither.
+    opening: whole(json.opening_view ?? 0, "set.opening_view", 0, steps[0].views - 1),
+    span: number(json.camera_span_rad ?? Math.PI, "set.camera_span_rad", 0, Math.PI),
     validation: words(json.validation, "set.validation"),
     failed: json.validation_failed === true,
     figures: Array.isArray(json.figures) ? json.figures.filter((f) => Array.isArray(f) && f.length === 2).map((f) => f.map(String)) : [],

@@ -1,12 +1,13 @@
 // Where the novel camera goes: around a point, through the scene, from photo to photo.
-import { cameraAt, fitted, pointAt } from "./camera.js";
+import { cameraAt, filling, pointAt } from "./camera.js";
 import {
   add, angleBetween, conjugate, dot, norm, quaternionAbout, quaternionProduct, scaled, slerp, sub, unitQuaternion,
 } from "./maths.js";
 
-const kRadiansPerPx = 0.005;
+const kMinOrbit = Math.PI / 8;   // radians by a drag across the canvas, which otherwise orbits by what the cameras span
 const kLeastFromPole = 0.05;     // radians between the view and straight up or down
 const kFlightShare = 0.6;        // of the distance to the pivot, per second
+const kTurnPerSecond = 1;        // radians
 const kPhotoMs = 500;
 
 /** The novel camera as the user moves it. Angles are rotations of the camera in the world. */
@@ -15,8 +16,8 @@ export class Navigation {
     this.set = set;
     this.up = up;
     this.jump = null;
-    this.photo = 0;
-    this.place(set.views[0]);
+    this.photo = set.opening;
+    this.place(set.views[this.photo]);
   }
 
   /** At a photo's own place, at once. */
@@ -29,7 +30,7 @@ export class Navigation {
 
   /** The camera for a canvas. */
   camera(width, height) {
-    return cameraAt(fitted(this.lens, width, height), this.rotation, this.centre);
+    return cameraAt(filling(this.lens, width, height), this.rotation, this.centre);
   }
 
   get forward() {
@@ -54,12 +55,18 @@ export class Navigation {
     this.centre = add(about, turned(sub(this.centre, about)));
   }
 
-  /** Drags the scene by pixels: the camera goes around `about`. */
-  orbit(dx, dy, about = this.pivot) {
+  /** Drags the scene by pixels of the page, `side` of them along its longer side: the camera goes around the pivot. */
+  orbit(dx, dy, side) {
+    const perPx = Math.max(this.set.span, kMinOrbit) / side;
+    this.rotateAbout(this.pivot, -dx * perPx, -dy * perPx);
+  }
+
+  // About the vertical and the camera's own horizontal axis.
+  rotateAbout(about, yaw, pitch) {
     this.jump = null;
-    this.turn(this.up, -dx * kRadiansPerPx, about);
+    this.turn(this.up, yaw, about);
     const right = cameraAt(this.lens, this.rotation, this.centre).matrix[0];
-    const fromUp = angleBetween(this.forward, this.up), pitch = -dy * kRadiansPerPx;
+    const fromUp = angleBetween(this.forward, this.up);
     const next = fromUp - pitch;
     if ((next > kLeastFromPole || pitch < 0) && (next < Math.PI - kLeastFromPole || pitch > 0)) this.turn(right, pitch, about);
   }
@@ -88,8 +95,7 @@ export class Navigation {
     this.centre = add(this.centre, step);
     this.pivot = add(this.pivot, step);
     if (turnX || turnY) {
-      const about = this.centre, px = 200 * seconds;
-      this.orbit(-turnX * px, turnY * px, about);
+      this.rotateAbout(this.centre, turnX * kTurnPerSecond * seconds, -turnY * kTurnPerSecond * seconds);
       this.pivot = add(this.centre, scaled(this.forward, this.distance));
     }
   }

@@ -136,7 +136,11 @@ export class Page {
     const moved = () => { this.dirty = true; };
     this.pointers = new Pointers(this.canvas, {
       begin: (at) => this.begin(this.onCanvas(at)),
-      orbit: (dx, dy) => { this.dragLine(dx) || navigation.orbit(dx, dy); moved(); },
+      orbit: (dx, dy) => {
+        const windowPx = Math.max(this.canvas.width, this.canvas.height) / this.ratio;
+        this.dragLine(dx) || navigation.orbit(dx, dy, windowPx);
+        moved();
+      },
       pan: (dx, dy) => { navigation.pan(dx * this.ratio, dy * this.ratio, this.camera()); moved(); },
       dolly: (factor, at) => { const p = this.onCanvas(at); navigation.dolly(factor, this.camera(), p, this.depthAt(p)); moved(); },
       click: (at) => this.click(this.onCanvas(at)),
@@ -144,7 +148,7 @@ export class Page {
     const commands = {
       Period: () => this.stepPhoto(1), Comma: () => this.stepPhoto(-1), KeyC: () => this.toggle("compare"),
       KeyV: () => this.toggle("depth"), KeyM: () => this.toggle("measure"), KeyF: () => this.fullScreen(),
-      KeyH: () => this.togglePanel(), Home: () => this.goTo(0), Space: () => this.time.toggle(),
+      KeyH: () => this.togglePanel(), Home: () => this.goTo(this.set.opening), Space: () => this.time.toggle(),
       KeyX: () => this.headset.toggle().catch((error) => showProblem(`the headset cannot be used: ${error.message}`)),
     };
     this.keys = new Keys(commands);

@@ -24,7 +24,7 @@ export class SetScene {
     this.uploads = [];
     takeState(gl);
     this.renderer = new Renderer(gl, shaders, this.set);
-    this.camera = this.set.views[0];
+    this.camera = this.set.views[this.set.opening];
     this.allLoaded = new Promise((resolve) => { this.complete = resolve; });
     const settled = () => { if (this.loader.done) this.complete(); };
     this.loader = new Loader({
