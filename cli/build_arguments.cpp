@@ -18,9 +18,8 @@ namespace {
 void AddDynamicOptions(CLI::App& command, BuildArguments& arguments) {
   CLI::Option* dynamic =
       command.add_flag("--dynamic", arguments.is_dynamic,
-                       "A dynamic set: a video or folder of photos of each of several fixed "
-                       "cameras, whose frames of "
-                       "equal number (or sync_index of timestamps.csv) are time steps");
+                       "A dynamic set: PHOTOS has a video or folder of photos per fixed camera; "
+                       "frames of equal number are time steps");
   command
       .add_option("--from", arguments.dynamic.from, "With --dynamic: first time step, from 0 [0]")
       ->check(CLI::NonNegativeNumber)
@@ -75,12 +74,12 @@ void AddPartOptions(CLI::App& command, BuildArguments& arguments) {
 
 void AddBuildOptions(CLI::App& command, BuildArguments& arguments) {
   pipeline::BuildOptions* options = &arguments.options;
-  if constexpr (DTR_WITH_DYNAMIC) AddDynamicOptions(command, arguments);
   command.add_option("PHOTOS", options->photos, "Folder of photos, a video, or a folder of videos")
       ->required();
   command.add_option("-o,--output", options->output, "The set to write, NAME.dtr")
       ->required()
       ->type_name("SET.dtr");
+  if constexpr (DTR_WITH_DYNAMIC) AddDynamicOptions(command, arguments);
   AddVideoOptions(command, options->video);
   AddPanoramaOption(command, options->panoramas);
   command
@@ -88,7 +87,7 @@ void AddBuildOptions(CLI::App& command, BuildArguments& arguments) {
                   "Photos held out from depth and textures, to measure with")
       ->type_name("every:N|NAME,...");
   command.add_flag("--holdout-strict", options->holdout_strict,
-                   "Keep them out of SfM too and register them afterwards");
+                   "Photos of --holdout take no part in SfM and are registered afterwards");
   AddDepthOptions(command, {"sgbm", "patchmatch", "colmap", "prior", "none"},
                   "Long side 800, 1024 or full size, and work spent on depth and, with fast, on "
                   "cameras (--features 4096) [balanced]",
@@ -100,16 +99,14 @@ void AddBuildOptions(CLI::App& command, BuildArguments& arguments) {
       ->type_name("PX");
   command
       .add_option("--poses", options->poses,
-                  "Known cameras, a file or folder of any program that --format names; no "
-                  "SfM then")
+                  "Known cameras, a file or folder of any program that --format names")
       ->type_name("FILE");
   command.add_option("--format", options->poses_format, "Format of --poses [by its content]")
       ->check(CLI::IsMember(pipeline::CameraFormats()))
       ->needs("--poses");
   command
       .add_option("--rig", options->rig,
-                  "Calibration of the rig that took all photos, of `dtr calibrate rig`: its "
-                  "intrinsics, positions and scale are fixed")
+                  "Calibration of the rig that took all photos, of `dtr calibrate rig`")
       ->type_name("RIG.json");
   CLI::Option* no_refine =
       command.add_flag("!--no-refine", options->refine,

@@ -45,16 +45,15 @@ void AddDepthOptions(CLI::App& command, const std::vector<std::string>& engines,
       ->type_name("DIR");
   CLI::Option* prior =
       command
-          .add_option(
-              "--depth-prior", choice.prior.folder,
-              "Folder of depth maps of the photos, or capture, by a phone or a depth camera, "
-              "of any resolution: they start --engine patchmatch, decide where the photos do not, "
-              "and are the depth with --engine prior")
+          .add_option("--depth-prior", choice.prior.folder,
+                      "Depth maps, or a capture, by a phone or depth camera, of any resolution: "
+                      "stereo starts from them; with --engine prior they are the depth")
           ->check(CLI::ExistingPath)
           ->type_name("DIR");
   command
       .add_option("--prior-unit", choice.prior.unit,
-                  "Scene units per number of such a map (0.001: millimetres of a set in metres)")
+                  "Scene units per number of a map of --depth-prior (0.001: millimetres of a set "
+                  "in metres)")
       ->check(kPositive)
       ->needs(prior)
       ->type_name("U");
@@ -74,15 +73,22 @@ void AddDepthOptions(CLI::App& command, const std::vector<std::string>& engines,
       ->type_name("PX");
   command.add_flag("--completion,!--no-completion", choice.completion,
                    "Complete depth where none was measured, so that images are whole [on]");
-  overriding("--neighbours", choice.neighbours, "Views that the search asks", 1,
+  overriding("--neighbours", choice.neighbours, "Views that the search compares with", 1,
              pipeline::kMaxNeighbours);
-  overriding("--round-neighbours", choice.round_neighbours,
+  overriding("--pass-neighbours", choice.pass_neighbours,
              "Views that the geometric-consistency passes use", 1, pipeline::kMaxNeighbours);
-  overriding("--iterations", choice.iterations, "Visits per pixel and level of the search", 1,
+  overriding("--iterations", choice.iterations, "Iterations per pixel and level of the search", 1,
              pipeline::kMaxIterations);
-  overriding("--rounds", choice.rounds,
+  overriding("--passes", choice.passes,
              "Geometric-consistency passes, in which views are checked against each other's planes",
-             0, pipeline::kMaxRounds);
+             0, pipeline::kMaxPasses);
+  // Names of 0.1, for one more release.
+  command.add_option("--round-neighbours", choice.pass_neighbours)
+      ->check(CLI::Range(1, pipeline::kMaxNeighbours))
+      ->group("");
+  command.add_option("--rounds", choice.passes)
+      ->check(CLI::Range(0, pipeline::kMaxPasses))
+      ->group("");
 }
 
 }  // namespace dtr::cli

@@ -6,8 +6,8 @@
 #include <string>
 
 #include "dtr/base/parallel_for.h"
+#include "stereo/geometric_passes.h"
 #include "stereo/left_out.h"
-#include "stereo/rounds.h"
 #include "stereo/side_by_side.h"
 #include "stereo/time_step.h"
 #include "stereo/widen.h"
@@ -51,9 +51,9 @@ class Run {
             const std::function<void(int, DepthEstimate&&, const DepthRange&)>& on_view) {
     const std::vector<int> wanted = Wanted(already_done), needed = Begin(wanted);
     if (options_.has_passes) {
-      RequirePass(Together(), needed, planes_, engine_.Rounds());
-    } else if (engine_.Rounds() > 0) {
-      RunRounds(Together(), needed, planes_, progress_);
+      RequirePass(Together(), needed, planes_, engine_.Passes());
+    } else if (engine_.Passes() > 0) {
+      RunAllPasses(Together(), needed, planes_, progress_);
     }
     progress_.Stage("depth", static_cast<int>(needed.size()));
     const int at_once = AtOnce(needed);
@@ -83,7 +83,7 @@ class Run {
   std::vector<int> Begin(const std::vector<int>& wanted) {
     std::vector<int> needed = Needed(wanted);
     CheckMemory(needed);
-    // All of them: rounds also match what is not needed itself, and must do so alike every time.
+    // All of them: passes also match what is not needed itself, and must do so alike every time.
     if (!needed.empty()) TellStrangers();
     if (!needed.empty()) ranges_ = Ranges();
     return needed;
@@ -176,8 +176,8 @@ class Run {
       return DepthEstimate{DepthImage(camera.width_px(), camera.height_px()),
                            Grid<float>(camera.width_px(), camera.height_px())};
     };
-    if (engine_.Rounds() > 0) {
-      const PlanesAround around(Together(), planes_, engine_.Rounds(), view);
+    if (engine_.Passes() > 0) {
+      const PlanesAround around(Together(), planes_, engine_.Passes(), view);
       if (!around.HasOwn()) return holes();
       const Room room(Together(), view);
       return engine_.Filter(room.views(), view, NeighboursOf(view),

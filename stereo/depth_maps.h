@@ -20,7 +20,7 @@ struct DepthMapsOptions {
   int widenings = 0;  ///< ends of ranges that prove too narrow move out so often at most (Widened)
   ConsistencyOptions consistency;
   EngineOptions engine;
-  /// Where planes wait between the rounds of engines that have any, so that an interrupted run can
+  /// Where planes wait between the passes of engines that have any, so that an interrupted run can
   /// go on from there; null: in memory, 24 bytes per pixel and view. Borrowed.
   PlaneMapStore* planes = nullptr;
   bool has_passes = false;  ///< `planes` has all of them (ComputeDepthPass), else it is an Error
@@ -51,9 +51,9 @@ class NotEnoughMemory : public Error {
 /// same time, which are handed out side by side, from several threads. A view
 /// whose neighbours are not done depends on their unfiltered maps too; those are computed even if
 /// the neighbours' own results are done, so a resumed run gives the same bytes as an undisturbed
-/// one. With an engine that has rounds, all views go through one round before the next begins (see
-/// RunRounds), and maps are handed out after the last. A view without neighbours, or for which the
-/// engine finds no usable pair, gets a map of holes and a note. Throws what the engine throws,
+/// one. With an engine that has passes, all views go through one pass before the next begins (see
+/// RunAllPasses), and maps are handed out after the last. A view without neighbours, or for which
+/// the engine finds no usable pair, gets a map of holes and a note. Throws what the engine throws,
 /// Error when a depth range is unknown, Interrupted between views, NotEnoughMemory before
 /// any work, UsageError when `given_ranges` has the wrong length.
 void ComputeDepthMaps(

@@ -35,9 +35,9 @@ void CheckRange(const char* what, int value, int least, int most) {
 
 std::unique_ptr<Engine> MakeEngine(const std::string& name, const QualitySettings& quality) {
   CheckRange("neighbours", quality.neighbours, 1, 8);
-  CheckRange("neighbours in the passes", quality.round_neighbours, 1, 8);
+  CheckRange("neighbours in the passes", quality.pass_neighbours, 1, 8);
   CheckRange("iterations", quality.iterations, 1, 20);
-  CheckRange("rounds", quality.rounds, 0, 8);
+  CheckRange("passes", quality.passes, 0, 8);
   if (name == "sgbm") return std::make_unique<SgbmEngine>(PairLimits{}, quality.neighbours);
   if (name == "patchmatch") return std::make_unique<PatchMatchEngine>(quality);
   throw UsageError("stereo engine: expected one of patchmatch, sgbm, found '" + name + "'");

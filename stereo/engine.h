@@ -25,7 +25,7 @@ struct StereoView {
   const ImageRgb8* image = nullptr;   ///< 8-bit sRGB, size of `camera`
   const Mask* mask = nullptr;         ///< null or empty: every pixel is usable
   const DepthPrior* prior = nullptr;  ///< null: nothing is known of its depth
-  /// What other time steps say of it, for engines with rounds; null: it is worked out alone.
+  /// What other time steps say of it, for engines with passes; null: it is worked out alone.
   const TimeStepSource* time_step = nullptr;
 };
 
@@ -42,12 +42,12 @@ struct DepthEstimate {
 
 /// How much work goes into a depth map. Every value may change the result.
 struct QualitySettings {
-  int neighbours = 5;        ///< views that the search asks, at most
-  int round_neighbours = 8;  ///< views that the passes and the final filter ask, at most 8
+  int neighbours = 5;       ///< views that the search asks, at most
+  int pass_neighbours = 8;  ///< views that the passes and the final filter ask, at most 8
   /// Visits per pixel on the levels between the coarsest (two more) and full size (two fewer, but
   /// one at least).
   int iterations = 3;
-  int rounds = 2;  ///< rounds in which views take account of each other's planes
+  int passes = 2;  ///< passes in which views take account of each other's planes
   bool operator==(const QualitySettings&) const = default;
 };
 
@@ -63,8 +63,8 @@ class NoUsablePair : public Error {
   using Error::Error;
 };
 
-/// Computes the depth of one reference view from its neighbours; engines with rounds also that of
-/// a collection, each view held to what the others found (RunRounds).
+/// Computes the depth of one reference view from its neighbours; engines with passes also that of
+/// a collection, each view held to what the others found (RunAllPasses).
 /// Deterministic: same input, options and seed give the same bytes for any number of threads.
 class Engine {
  public:
@@ -89,20 +89,20 @@ class Engine {
     return 0;
   }
 
-  /// Rounds in which views take account of each other's planes; 0: Estimate is all there is.
-  virtual int Rounds() const { return 0; }
-  /// The planes behind Estimate, nothing rejected. Engines with rounds only.
+  /// Passes in which views take account of each other's planes; 0: Estimate is all there is.
+  virtual int Passes() const { return 0; }
+  /// The planes behind Estimate, nothing rejected. Engines with passes only.
   virtual PlaneMap Match(std::span<const StereoView> views, int reference,
                          std::span<const int> neighbours, const DepthRange& range,
                          const EngineOptions& options) const;
-  /// One round: the planes of `reference` again, starting from `maps[reference]` and held to the
-  /// planes of its neighbours. `maps` has one entry per view, null where there is none; `round`
+  /// One pass: the planes of `reference` again, starting from `maps[reference]` and held to the
+  /// planes of its neighbours. `maps` has one entry per view, null where there is none; `pass`
   /// counts from 1.
   virtual PlaneMap Refine(std::span<const StereoView> views, int reference,
                           std::span<const int> neighbours, const DepthRange& range,
-                          std::span<const PlaneMap* const> maps, int round,
+                          std::span<const PlaneMap* const> maps, int pass,
                           const EngineOptions& options) const;
-  /// What of the planes after the last round is believed, and how much.
+  /// What of the planes after the last pass is believed, and how much.
   virtual DepthEstimate Filter(std::span<const StereoView> views, int reference,
                                std::span<const int> neighbours, const DepthRange& range,
                                std::span<const PlaneMap* const> maps,
@@ -111,7 +111,7 @@ class Engine {
 
 /// Engine by its name on the command line ("sgbm"), which makes use of `neighbours` alone.
 /// Throws UsageError for unknown names and for settings out of range: 1 to 8 neighbours, 1 to 20
-/// iterations, 0 to 8 rounds.
+/// iterations, 0 to 8 passes.
 std::unique_ptr<Engine> MakeEngine(const std::string& name, const QualitySettings& quality = {});
 
 }  // namespace dtr::stereo

@@ -15,7 +15,7 @@ namespace dtr::stereo {
 /// Which thing of which view.
 struct PageKey {
   enum class Kind { kPixels, kPlanes, kEstimate } kind = Kind::kPixels;
-  int round = 0;  ///< of planes
+  int pass = 0;  ///< of planes
   int view = 0;
   auto operator<=>(const PageKey&) const = default;
 };

@@ -1,4 +1,4 @@
-// stereo/plane_map.h -- a slanted plane per pixel: what views tell each other between rounds.
+// stereo/plane_map.h -- a slanted plane per pixel: what views tell each other between passes.
 #pragma once
 #include <map>
 #include <memory>
@@ -27,34 +27,34 @@ struct PlaneMap {
 class PlaneMapStore {
  public:
   virtual ~PlaneMapStore() = default;
-  /// True when Save was called for this round and view, perhaps by an earlier run of the same job.
-  virtual bool Has(int round, int view) const = 0;
-  /// Requires Has(round, view).
-  virtual std::shared_ptr<const PlaneMap> Load(int round, int view) = 0;
-  virtual void Save(int round, int view, PlaneMap&& map) = 0;
-  /// Nothing of this round is wanted any more.
-  virtual void Drop(int round) = 0;
+  /// True when Save was called for this pass and view, perhaps by an earlier run of the same job.
+  virtual bool Has(int pass, int view) const = 0;
+  /// Requires Has(pass, view).
+  virtual std::shared_ptr<const PlaneMap> Load(int pass, int view) = 0;
+  virtual void Save(int pass, int view, PlaneMap&& map) = 0;
+  /// Nothing of this pass is wanted any more.
+  virtual void Drop(int pass) = 0;
 };
 
-/// Keeps everything in memory: 12 bytes per pixel, view and round.
+/// Keeps everything in memory: 12 bytes per pixel, view and pass.
 class PlaneMapsInMemory final : public PlaneMapStore {
  public:
-  bool Has(int round, int view) const override {
+  bool Has(int pass, int view) const override {
     const std::lock_guard lock(mutex_);
-    return maps_.contains({round, view});
+    return maps_.contains({pass, view});
   }
-  std::shared_ptr<const PlaneMap> Load(int round, int view) override {
+  std::shared_ptr<const PlaneMap> Load(int pass, int view) override {
     const std::lock_guard lock(mutex_);
-    return maps_.at({round, view});
+    return maps_.at({pass, view});
   }
-  void Save(int round, int view, PlaneMap&& map) override {
+  void Save(int pass, int view, PlaneMap&& map) override {
     auto saved = std::make_shared<const PlaneMap>(std::move(map));
     const std::lock_guard lock(mutex_);
-    maps_[{round, view}] = std::move(saved);
+    maps_[{pass, view}] = std::move(saved);
   }
-  void Drop(int round) override {
+  void Drop(int pass) override {
     const std::lock_guard lock(mutex_);
-    std::erase_if(maps_, [&](const auto& entry) { return entry.first.first == round; });
+    std::erase_if(maps_, [&](const auto& entry) { return entry.first.first == pass; });
   }
 
  private:

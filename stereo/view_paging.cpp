@@ -25,16 +25,16 @@ std::uint64_t OtherBytes(const StereoView& view) {
          (view.time_step != nullptr ? TimeStepBytes(view.camera) : 0);
 }
 
-std::shared_ptr<const PlaneMap> PagedPlanes::Load(int round, int view) {
-  return pages_.Get<PlaneMap>({PageKey::Kind::kPlanes, round, view},
+std::shared_ptr<const PlaneMap> PagedPlanes::Load(int pass, int view) {
+  return pages_.Get<PlaneMap>({PageKey::Kind::kPlanes, pass, view},
                               PlaneBytes(views_[static_cast<size_t>(view)].camera),
-                              [&] { return store_.Load(round, view); });
+                              [&] { return store_.Load(pass, view); });
 }
 
-void PagedPlanes::Drop(int round) {
+void PagedPlanes::Drop(int pass) {
   pages_.Drop(
-      [&](const PageKey& key) { return key.kind == PageKey::Kind::kPlanes && key.round == round; });
-  store_.Drop(round);
+      [&](const PageKey& key) { return key.kind == PageKey::Kind::kPlanes && key.pass == pass; });
+  store_.Drop(pass);
 }
 
 std::shared_ptr<const DepthEstimate> PagedEstimates::Load(int view) {
@@ -73,7 +73,7 @@ std::uint64_t LeastBytes(std::span<const StereoView> views, const Engine& engine
   const auto add = [&](int v) {
     const PinholeCamera& camera = views[static_cast<size_t>(v)].camera;
     const std::uint64_t own_pixels = pixels_are_paged ? PixelBytes(camera) : 0;
-    const std::uint64_t own_planes = engine.Rounds() > 0 ? PlaneBytes(camera) : 0;
+    const std::uint64_t own_planes = engine.Passes() > 0 ? PlaneBytes(camera) : 0;
     pixels += own_pixels;
     planes += own_planes;
     estimates += filters || v == view ? EstimateBytes(camera) : 0;

@@ -63,12 +63,12 @@ class PagedPlanes final : public PlaneMapStore {
  public:
   PagedPlanes(PlaneMapStore& store, Pages& pages, std::span<const StereoView> views)
       : store_(store), pages_(pages), views_(views) {}
-  bool Has(int round, int view) const override { return store_.Has(round, view); }
-  std::shared_ptr<const PlaneMap> Load(int round, int view) override;
-  void Save(int round, int view, PlaneMap&& map) override {
-    store_.Save(round, view, std::move(map));
+  bool Has(int pass, int view) const override { return store_.Has(pass, view); }
+  std::shared_ptr<const PlaneMap> Load(int pass, int view) override;
+  void Save(int pass, int view, PlaneMap&& map) override {
+    store_.Save(pass, view, std::move(map));
   }
-  void Drop(int round) override;
+  void Drop(int pass) override;
 
  private:
   PlaneMapStore& store_;

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "dtr/base/progress.h"
-#include "stereo/rounds.h"
+#include "stereo/geometric_passes.h"
 
 namespace dtr::stereo {
 

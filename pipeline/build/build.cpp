@@ -258,7 +258,7 @@ class StillBuild {
 
   std::vector<Step> DepthSteps() {
     if (options_.depth.engine != "patchmatch" && options_.depth.engine != "sgbm") return {};
-    const int passes = stereo::MakeEngine(options_.depth.engine, quality_)->Rounds();
+    const int passes = stereo::MakeEngine(options_.depth.engine, quality_)->Passes();
     std::vector<Step> steps = {{{"ranges", false}, [this](const Part& part) {
                                   TakeViews({});
                                   FindDepth(DepthStep{DepthStep::kRanges, part});

@@ -127,7 +127,8 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
   provenance["depth_engine"] = options.depth.engine;
   auto& recorded = provenance["options"];
   if (!recorded.is_object()) recorded = nlohmann::ordered_json::object();  // an imported set
-  for (const char* old : {"neighbours", "round_neighbours", "iterations", "rounds"}) {
+  for (const char* old : {"neighbours", "pass_neighbours", "iterations", "passes",
+                          "round_neighbours", "rounds"}) {  // the last two: sets of 0.1
     recorded.erase(old);
   }
   recorded.update(SettingsJson(options.depth.engine, stage.quality));

@@ -27,14 +27,14 @@ const Preset& PresetCalled(const std::string& name);
 /// Memory to stay within unless told otherwise.
 inline constexpr double kDefaultMemoryGb = 4;
 
-/// The max of each in quality settings; rounds may be none, the others are 1 at least.
-inline constexpr int kMaxNeighbours = 8, kMaxIterations = 20, kMaxRounds = 8;
+/// The max of each in quality settings; passes may be none, the others are 1 at least.
+inline constexpr int kMaxNeighbours = 8, kMaxIterations = 20, kMaxPasses = 8;
 
 /// What was asked for: a preset, and what overrides it.
 struct DepthChoice {
   std::string engine = "patchmatch";  ///< "none": no depth; "prior": that of `prior`, as it is
   std::string preset = "balanced";
-  std::optional<int> neighbours, round_neighbours, iterations, rounds;
+  std::optional<int> neighbours, pass_neighbours, iterations, passes;
   std::optional<double> time_budget_s;  ///< picks what is not given explicitly
   std::optional<double> memory_gb;      ///< gigabytes; absent: kDefaultMemoryGb, or what is needed
   /// Pixels of disparity that storing may move a depth; absent: png16-inverse, practically exact.

@@ -70,7 +70,7 @@ void RequireDynamicOptions(const BuildOptions& options, const DynamicOptions& dy
 bool IsTemporal(const BuildOptions& options, const DynamicOptions& dynamic,
                 const stereo::QualitySettings& quality) {
   if (!dynamic.temporal || options.depth.engine == "none") return false;
-  if (options.depth.engine == "patchmatch" && quality.rounds > 0) return true;
+  if (options.depth.engine == "patchmatch" && quality.passes > 0) return true;
   throw UsageError(
       "`temporal`: on needs `engine` patchmatch with one pass or more, whose planes go from one "
       "time step to the next; give `temporal` off");

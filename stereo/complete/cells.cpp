@@ -18,7 +18,7 @@ constexpr float kLevel = 1e-3F;  // of the weight, towards a plane of constant d
 constexpr int kPlaneFits = 3;
 
 struct CellSums {
-  double rgb[3] = {}, measured_rgb[3] = {};
+  double rgb[3] = {};
   int usable = 0;
   std::vector<float> inverse_depths;
 };
@@ -35,23 +35,18 @@ void Average(const View& view, int cell_px, CellView& cells) {
           ++sums.usable;
           const float z = view.depth(std::min(i / view.depth_scale, view.depth.width() - 1),
                                      std::min(j / view.depth_scale, view.depth.height() - 1));
-          if (DepthImage::IsHole(z)) continue;
-          for (int c = 0; c < 3; ++c) sums.measured_rgb[c] += view.image(i, j, c);
-          sums.inverse_depths.push_back(1 / z);
+          if (!DepthImage::IsHole(z)) sums.inverse_depths.push_back(1 / z);
         }
       }
       if (sums.usable == 0) continue;
       cells.usable(x, y) = 255;
-      const auto known = sums.inverse_depths.size();
-      const bool measured = 2 * known >= static_cast<size_t>(sums.usable);
       for (int c = 0; c < 3; ++c) {
-        // Mean of the measured pixels: beside an outline the others show another surface.
-        const double mean = measured ? sums.measured_rgb[c] / static_cast<double>(known) / 255
-                                     : sums.rgb[c] / sums.usable / 255;
+        const double mean = sums.rgb[c] / sums.usable / 255;
         cells.colour(x, y, c) =
             static_cast<float>(255 * SrgbFromLinear(Exposed(LinearFromSrgb(mean), view.gain[c])));
       }
-      if (!measured) continue;
+      const auto known = sums.inverse_depths.size();
+      if (2 * known < static_cast<size_t>(sums.usable)) continue;
       const auto middle = sums.inverse_depths.begin() + static_cast<std::ptrdiff_t>(known / 2);
       std::nth_element(sums.inverse_depths.begin(), middle, sums.inverse_depths.end());
       cells.inverse_depth(x, y) = *middle;

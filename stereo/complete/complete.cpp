@@ -47,14 +47,15 @@ std::vector<ScenePlane> PlanesToChoose(std::span<const CellView> views,
 
 std::vector<CompletedCells> CompleteCells(std::span<const CellView> views,
                                           std::span<const std::vector<int>> neighbours,
-                                          std::span<const ScenePlane> planes, Progress& progress) {
+                                          std::span<const ScenePlane> planes, int at_once,
+                                          Progress& progress) {
   const int count = static_cast<int>(views.size());
   progress.Stage("completion", kPasses * count);
   std::atomic<int> done = 0;
   std::vector<CompletedCells> completed;
   for (int pass = 0; pass < kPasses; ++pass) {
     std::vector<CompletedCells> next(views.size());
-    ParallelFor(0, count, [&](int i) {
+    ParallelFor(0, count, at_once, [&](int i) {
       progress.ThrowIfInterrupted();
       const auto v = static_cast<size_t>(i);
       const Around around = AroundOf(views, neighbours[v], completed);
@@ -66,16 +67,16 @@ std::vector<CompletedCells> CompleteCells(std::span<const CellView> views,
   return completed;
 }
 
-std::uint64_t CompletionBytes(std::span<const PinholeCamera> cameras) {
-  constexpr std::uint64_t kLabels = kOwnLabels + kLargestPlanes + kSweptPlanes;
-  std::uint64_t bytes = 0, largest = 0;
+CompletionMemory CompletionMemoryOf(std::span<const PinholeCamera> cameras) {
+  constexpr double kLabels = kOwnLabels + kLargestPlanes + kSweptPlanes;
+  CompletionMemory memory;
   for (const PinholeCamera& camera : cameras) {
-    const std::uint64_t cells = CellBytes(camera);
-    bytes += 2 * cells;  // with two passes' planes
-    largest = std::max(largest, cells);
+    const auto cells = static_cast<double>(CellBytes(camera));
+    memory.cells_bytes += 2 * cells;  // with two passes' planes
+    // Of each label a plane and two costs: 20 bytes, where a cell has 30.
+    memory.view_bytes = std::max(memory.view_bytes, cells * kLabels);
   }
-  // Of each label a plane and two costs: 20 bytes, where a cell has 30.
-  return bytes + static_cast<std::uint64_t>(ThreadLimit::Current()) * largest * kLabels;
+  return memory;
 }
 
 }  // namespace dtr::stereo

@@ -20,12 +20,18 @@ std::vector<ScenePlane> PlanesToChoose(std::span<const CellView> views,
 /// Planes for all cells of all views (docs/METHODS.md, 11.1): measured surfaces that go on, those
 /// of other views, `planes` of the scene, or infinitely far, whichever the photos agree on, in two
 /// passes: the second holds each view to what the others chose. `neighbours`: as above.
-/// Deterministic for any number of threads. Throws Interrupted between views.
+/// `at_once`: views that memory has room for at a time. Deterministic for any number of threads.
+/// Throws Interrupted between views.
 std::vector<CompletedCells> CompleteCells(std::span<const CellView> views,
                                           std::span<const std::vector<int>> neighbours,
-                                          std::span<const ScenePlane> planes, Progress& progress);
+                                          std::span<const ScenePlane> planes, int at_once,
+                                          Progress& progress);
 
-/// Bytes that CompleteCells takes at most for views of these cameras, their cells included.
-std::uint64_t CompletionBytes(std::span<const PinholeCamera> cameras);
+/// Memory of CompleteCells for views of these cameras, at most.
+struct CompletionMemory {
+  double cells_bytes = 0;  ///< of all views, with their cells
+  double view_bytes = 0;   ///< beside, for each view being completed
+};
+CompletionMemory CompletionMemoryOf(std::span<const PinholeCamera> cameras);
 
 }  // namespace dtr::stereo

@@ -233,10 +233,10 @@ void ChooseJointly(const Level& level, const Sweep& sweep, const State& state, c
 }
 
 /// Three uniform numbers in [-1, 1) per lane, named by pixel and use.
-void Draw(const Level& level, const Group& g, int round, int use, float (*out)[kLanes]) {
+void Draw(const Level& level, const Group& g, int number, int use, float (*out)[kLanes]) {
   for (size_t i = 0; i < kLanes; ++i) {
     const std::uint64_t bits =
-        HashOf(level.seed, g.x + 2 * static_cast<int>(i), g.y, static_cast<int>(round * 16 + use));
+        HashOf(level.seed, g.x + 2 * static_cast<int>(i), g.y, static_cast<int>(number * 16 + use));
     for (int k = 0; k < 3; ++k) {
       const auto part = static_cast<std::int32_t>((bits >> (21 * k)) & 0x1fffff);
       out[k][i] = static_cast<float>(part) * 0x1.0p-20f - 1.0f;
@@ -260,20 +260,20 @@ void Refine(const Level& level, const Sweep& sweep, const State& state, const Gr
   // A slope that moves the window's corner as far as `step` moves its centre.
   const VF slope = hn::Mul(step, hn::Set(d, 1.0f / kRadius));
   HWY_ALIGN float r[3][kLanes];
-  Draw(level, g, sweep.round, 0, r);
+  Draw(level, g, sweep.number, 0, r);
   const VF w0 = hn::Load(d, best->w), a0 = hn::Load(d, best->a), b0 = hn::Load(d, best->b);
   if (sweep.move) TryPlane(level, g, hn::MulAdd(step, hn::Load(d, r[0]), w0), a0, b0, best);
   const VF w1 = hn::Load(d, best->w), a1 = hn::Load(d, best->a), b1 = hn::Load(d, best->b);
   TryPlane(level, g, w1, hn::MulAdd(slope, hn::Load(d, r[1]), a1),
            hn::MulAdd(slope, hn::Load(d, r[2]), b1), best);
-  Draw(level, g, sweep.round, 1, r);
+  Draw(level, g, sweep.number, 1, r);
   const VF quarter = hn::Set(d, 0.25f);
   const VF w2 = hn::Load(d, best->w), a2 = hn::Load(d, best->a), b2 = hn::Load(d, best->b);
   TryPlane(level, g, hn::MulAdd(hn::Mul(quarter, step), hn::Load(d, r[0]), w2),
            hn::MulAdd(hn::Mul(quarter, slope), hn::Load(d, r[1]), a2),
            hn::MulAdd(hn::Mul(quarter, slope), hn::Load(d, r[2]), b2), best);
   if (!sweep.jump) return;
-  Draw(level, g, sweep.round, 2, r);
+  Draw(level, g, sweep.number, 2, r);
   const float mid = 0.5f * (level.w_min + level.w_max), span = 0.5f * (level.w_max - level.w_min);
   const VF w3 = hn::MulAdd(hn::Load(d, r[0]), hn::Set(d, span), hn::Set(d, mid));
   const VF tilt = hn::Div(hn::Set(d, 1.0f), px);

@@ -66,7 +66,7 @@ struct Source {
   /// Projection to texture index coordinates (pixel centre i at i + kTextureBorder).
   float m[9] = {};
   float k[3] = {};
-  /// The neighbour's own planes of the round before, if there was one; the factor from their
+  /// The neighbour's own planes of the pass before, if there was one; the factor from their
   /// inverse depths to the level's; and the projection back, from texture index coordinates to
   /// pixels of the reference.
   const PlaneMap* surface = nullptr;
@@ -113,7 +113,7 @@ struct Level {
 /// What one visit of a pixel tries.
 struct Sweep {
   int colour = 0;       ///< of the checkerboard: pixels with (x + y) % 2 == colour
-  int round = 0;        ///< names the random numbers
+  int number = 0;       ///< names the random numbers
   int iteration = 0;    ///< of this level; the test for good views gets stricter
   int far_regions = 4;  ///< strips of far pixels whose best plane is tried, 0 or 4
   bool move = true;     ///< try the best plane up to step_px nearer or farther
@@ -129,7 +129,7 @@ struct PixelEstimate {
   float px = 0;        ///< pixels of disparity per unit of w in the views used
   float texture = 0;   ///< variance of the window's pixels like its centre, grey levels squared
   int agreeing = 0;    ///< views that see the same surface there
-  int consistent = 0;  ///< views whose own planes lead back to the pixel (after rounds)
+  int consistent = 0;  ///< views whose own planes lead back to the pixel (after passes)
 };
 
 /// Colour of the checkerboard whose pixels get a first guess. Sweeps begin with the other.
@@ -146,7 +146,7 @@ std::int64_t SearchRow(const Level& level, int samples, int y, State* state);
 /// best. Reads only pixels of the other colour, so rows may run in any order.
 std::int64_t SweepRow(const Level& level, const Sweep& sweep, int y, State* state);
 
-/// View weights to begin a round with: equal shares of the views whose own planes lead back to
+/// View weights to begin a pass with: equal shares of the views whose own planes lead back to
 /// within 3 pixels of the pixel, of all where none does. The others can hardly get a say, and
 /// SweepRow need not look at most of them.
 void ExpectRow(const Level& level, int y, State* state);

@@ -45,13 +45,13 @@ HWY_INLINE VF Vertex(VF before, VF here, VF after, VF* curvature) {
   return hn::Min(hn::Max(at, hn::Set(d, -1.0f)), hn::Set(d, 1.0f));
 }
 
-/// What each view says of the pixels' own planes, after rounds.
+/// What each view says of the pixels' own planes, after passes.
 struct Said {
   HWY_ALIGN float cost[kMaxViews][kLanes];    ///< photometric
   HWY_ALIGN float off_px[kMaxViews][kLanes];  ///< RoundTripPx
 };
 
-/// Shares of the views in a validation result. After rounds, a view counts by how well it agrees,
+/// Shares of the views in a validation result. After passes, a view counts by how well it agrees,
 /// in looks and in place; before, by what the sweeps found.
 void WeighViews(const Level& level, const State& state, const Group& g, VF w, VF a, VF b,
                 float (*weights)[kLanes], Said* said) {

@@ -17,7 +17,7 @@ static_assert(2 * kLanes <= kBorder, "a group's pixels must not leave the border
 
 /// Fall-off of the window's weights, exp(-distance s - difference c) with the distance in pixels
 /// and the largest difference of a channel in levels. What is past an edge mostly differs in
-/// colour, and is to have no say. On three views of plaza after one round, share of all true pixels
+/// colour, and is to have no say. On three views of plaza after one pass, share of all true pixels
 /// within 1 % and mean displacement of edges: grey with c = 0.056 (Xu and Tao, CVPR 2019) 85.6
 /// %, 2.28 px; grey with 0.11 86.1 %, 2.07 px; colour with 0.11 86.5 %, 1.93 px; with 0.2 the same,
 /// on less texture.

@@ -8,10 +8,10 @@
 
 #include "dtr/base/parallel_for.h"
 #include "dtr/base/random.h"
+#include "stereo/patchmatch/depth_filter.h"
 #include "stereo/patchmatch/expected.h"
 #include "stereo/patchmatch/hypotheses.h"
 #include "stereo/patchmatch/level.h"
-#include "stereo/patchmatch/trust.h"
 #include "stereo/prior_use.h"
 #include "stereo/time_step.h"
 
@@ -30,14 +30,14 @@ constexpr int kMoreIterations = 2;
 constexpr float kFirstStepPx = 4.0f, kFinestStepPx = 1.0f;
 /// In the place of QualitySettings::iterations where the result is only looked at.
 constexpr int kLookIterations = 1;
-/// Visits per pixel in each round of geometric consistency.
+/// Visits per pixel in each pass of geometric consistency.
 constexpr int kRefineIterations = 1;
 /// Visits per open pixel that begins with its plane of the time step before.
 constexpr int kFollowIterations = 3;
 /// Open pixels whose followed plane costs more than this are searched for from nothing.
 constexpr float kLostCost = 0.5f;
 constexpr int kFollowRoundNumber = 500;  // names its random numbers apart from the search's
-constexpr int kFirstRoundNumber = 1000;  // names random numbers apart from the search's
+constexpr int kFirstPassNumber = 1000;   // names random numbers apart from the search's
 /// A pair whose rays to the middle of the range meet at less than this has no baseline.
 constexpr double kSmallestDisparityPx = 0.5;
 
@@ -117,12 +117,12 @@ int LevelsFor(std::span<const StereoView> views, int reference, std::span<const 
   return levels;
 }
 
-void RunSweeps(const Level& level, Sweep sweep, int iterations, float step_px, int* round,
+void RunSweeps(const Level& level, Sweep sweep, int iterations, float step_px, int* number,
                State* state) {
   for (int i = 0; i < iterations; ++i) {
     sweep.iteration = i;
     sweep.step_px = step_px * std::exp2(static_cast<float>(-i));
-    sweep.round = (*round)++;
+    sweep.number = (*number)++;
     for (sweep.colour = 0; sweep.colour < 2; ++sweep.colour) {
       ParallelFor(0, level.reference.height, [&](int y) { SweepRow(level, sweep, y, state); });
     }
@@ -136,7 +136,7 @@ State SearchPyramid(const StereoView& view, std::span<const GreyImage> pictures,
                     const std::function<void(size_t index, Level*)>& expect, Level* finest) {
   State state;
   Level level, coarser;
-  int round = 0;
+  int number = 0;
   // From the coarsest of at least one; left at the finest.
   for (size_t index = pictures.size() - 1;; --index, coarser = std::move(level)) {
     const std::uint64_t seed = HashOf(options.seed, index);
@@ -160,7 +160,7 @@ State SearchPyramid(const StereoView& view, std::span<const GreyImage> pictures,
     const int visits = coarsest     ? iterations + kMoreIterations
                        : index == 0 ? std::max(1, iterations - kMoreIterations)
                                     : iterations;
-    RunSweeps(level, sweep, visits, coarsest ? kFirstStepPx : kFinestStepPx * 2, &round, &state);
+    RunSweeps(level, sweep, visits, coarsest ? kFirstStepPx : kFinestStepPx * 2, &number, &state);
     if (index == 0) break;
   }
   *finest = std::move(level);
@@ -259,18 +259,18 @@ struct Problem {
 
 DepthEstimate Assessed(const Problem& problem, State* state, std::atomic<int>* without_planes) {
   bool planes_left_out = false;
-  DepthEstimate estimate = TrustedDepth(problem.finest, *problem.view, problem.range,
-                                        problem.time_step.get(), state, &planes_left_out);
+  DepthEstimate estimate = FilteredDepth(problem.finest, *problem.view, problem.range,
+                                         problem.time_step.get(), state, &planes_left_out);
   *without_planes += planes_left_out ? 1 : 0;
   return estimate;
 }
 
 }  // namespace
 
-int PatchMatchEngine::Rounds() const { return quality_.rounds; }
+int PatchMatchEngine::Passes() const { return quality_.passes; }
 
 int PatchMatchEngine::Neighbours() const {
-  return std::min(kMaxViews, std::max(quality_.neighbours, quality_.round_neighbours));
+  return std::min(kMaxViews, std::max(quality_.neighbours, quality_.pass_neighbours));
 }
 
 std::uint64_t PatchMatchEngine::WorkBytes(std::span<const StereoView> views, int reference,
@@ -286,10 +286,10 @@ std::uint64_t PatchMatchEngine::WorkBytes(std::span<const StereoView> views, int
                        (has_prior ? kExpectedBytes : 0);
   const double search = area(w, h, kBorder) * state + std::max(area(w / 2, h / 2, kBorder) * state,
                                                                area(w, h, 0) * kEstimateBytes);
-  const double round = quality_.rounds == 0 ? 0
-                                            : area(w, h, kBorder) * (state + kGuessBytes) +
-                                                  area(w, h, 0) * kPlaneBytes;
-  double bytes = kSmallThingsBytes + std::max(search, round) + area(w, h, 0) * kImageBytes;
+  const double pass = quality_.passes == 0 ? 0
+                                           : area(w, h, kBorder) * (state + kGuessBytes) +
+                                                 area(w, h, 0) * kPlaneBytes;
+  double bytes = kSmallThingsBytes + std::max(search, pass) + area(w, h, 0) * kImageBytes;
   if (has_prior) bytes += static_cast<double>(PriorBytes(camera));
   if (views[static_cast<size_t>(reference)].time_step != nullptr) {
     bytes += static_cast<double>(TimeStepBytes(camera)) +
@@ -325,9 +325,9 @@ PlaneMap PatchMatchEngine::Match(std::span<const StereoView> views, int referenc
 
 PlaneMap PatchMatchEngine::Refine(std::span<const StereoView> views, int reference,
                                   std::span<const int> neighbours, const DepthRange& range,
-                                  std::span<const PlaneMap* const> maps, int round,
+                                  std::span<const PlaneMap* const> maps, int pass,
                                   const EngineOptions& options) const {
-  Problem problem(views, reference, neighbours, range, maps, quality_.round_neighbours);
+  Problem problem(views, reference, neighbours, range, maps, quality_.pass_neighbours);
   State state = problem.Resume(*maps[static_cast<size_t>(reference)], options);
   HypothesesFromSurfaces(problem.finest, &state);
   problem.SuggestBackground(&state);
@@ -336,7 +336,7 @@ PlaneMap PatchMatchEngine::Refine(std::span<const StereoView> views, int referen
   Sweep sweep;
   sweep.move = sweep.jump = false;
   sweep.far_regions = 0;  // far planes have come as near as they could
-  int number = kFirstRoundNumber * round;
+  int number = kFirstPassNumber * pass;
   RunSweeps(problem.finest, sweep, kRefineIterations, kFinestStepPx, &number, &state);
   PlaneMap map = PlanesOf(problem.finest, state, range);
   if (problem.time_step) KeepSettledPlanes(*problem.time_step, &map);
@@ -347,7 +347,7 @@ DepthEstimate PatchMatchEngine::Filter(std::span<const StereoView> views, int re
                                        std::span<const int> neighbours, const DepthRange& range,
                                        std::span<const PlaneMap* const> maps,
                                        const EngineOptions& options) const {
-  Problem problem(views, reference, neighbours, range, maps, quality_.round_neighbours);
+  Problem problem(views, reference, neighbours, range, maps, quality_.pass_neighbours);
   State state = problem.Resume(*maps[static_cast<size_t>(reference)], options);
   return Assessed(problem, &state, &without_planes_);
 }

@@ -1,5 +1,5 @@
 // Four webcams whose calibration another program published: what of it our own solves of the same
-// images confirm, and what the images themselves cannot decide (docs/CALIBRATION.md has the
+// images confirm, and what the images themselves cannot decide (docs/accuracy/CALIBRATION.md has the
 // figures that this prints).
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// What the lenses and photos of a rig are rejected for: the words of docs/ERRORS.md.
+// Reasons for which the intrinsics and photos of a rig are rejected: the words of the lines.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

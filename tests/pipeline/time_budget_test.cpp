@@ -9,7 +9,7 @@ namespace dtr::pipeline {
 namespace {
 
 // About what a core of a Xeon takes.
-constexpr ProbedCosts kCosts{.search_s = 4e-7, .round_s = 4e-7, .check_s = 1.5e-7};
+constexpr ProbedCosts kCosts{.search_s = 4e-7, .pass_s = 4e-7, .check_s = 1.5e-7};
 
 std::vector<stereo::StereoView> Views(int count) {
   return std::vector<stereo::StereoView>(
@@ -50,8 +50,8 @@ TEST(TimeBudget, PicksTheMostThatFits) {
 
 TEST(TimeBudget, WhatIsGivenExplicitlyStays) {
   DepthChoice choice = Within(1e9);
-  choice.rounds = 1;
-  EXPECT_EQ(PickQuality(kCosts, choice, Views(4)).rounds, 1);
+  choice.passes = 1;
+  EXPECT_EQ(PickQuality(kCosts, choice, Views(4)).passes, 1);
 }
 
 TEST(TimeBudget, TwiceThePixelsOrViewsTakeTwiceAsLong) {
@@ -59,7 +59,7 @@ TEST(TimeBudget, TwiceThePixelsOrViewsTakeTwiceAsLong) {
   const double once = PredictSeconds(kCosts, quality, Views(16));
   EXPECT_NEAR(PredictSeconds(kCosts, quality, Views(32)), 2 * once, 1e-9 * once);
   // Two views have one neighbour each, however many are asked for.
-  const stereo::QualitySettings one{.neighbours = 1, .round_neighbours = 1};
+  const stereo::QualitySettings one{.neighbours = 1, .pass_neighbours = 1};
   EXPECT_EQ(PredictSeconds(kCosts, quality, Views(2)), PredictSeconds(kCosts, one, Views(2)));
 }
 

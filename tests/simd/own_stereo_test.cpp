@@ -49,7 +49,7 @@ NamedScene WithOwnDepth(NamedScene scene) {
     photos.push_back({view.camera, view.cam_from_world, &view.image, nullptr});
   }
   const auto engine =
-      stereo::MakeEngine("patchmatch", {.neighbours = 3, .iterations = 2, .rounds = 0});
+      stereo::MakeEngine("patchmatch", {.neighbours = 3, .iterations = 2, .passes = 0});
   stereo::DepthMapsOptions options;
   options.neighbours.count = engine->Neighbours();
   SilentProgress progress;

@@ -99,7 +99,7 @@ struct Row {
     SilentProgress silent;
     std::vector<ScenePlane> planes;
     if (with_scene_planes) planes = PlanesToChoose(cells, neighbours);
-    const auto completed = CompleteCells(cells, neighbours, planes, silent);
+    const auto completed = CompleteCells(cells, neighbours, planes, 2, silent);
     std::vector<DepthImage> depths;
     for (size_t i = 0; i < views.size(); ++i) {
       depths.push_back(ExpandCells(views[i], cells[i], completed[i], kFarZ));

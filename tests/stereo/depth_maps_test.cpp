@@ -43,15 +43,15 @@ class CountingEngine final : public WallEngine, public CountsLeftOut {
   int without_planes() const override { return std::min(2, calls.load()); }
 };
 
-/// A plane's inverse depth is 1/4 + 0.001 view at first; a round adds a tenth of what the view and
-/// its neighbours had: any other order, or a map of the wrong round, shows.
+/// A plane's inverse depth is 1/4 + 0.001 view at first; a pass adds a tenth of what the view and
+/// its neighbours had: any other order, or a map of the wrong pass, shows.
 class RoundsEngine final : public Engine {
  public:
-  std::string name() const override { return "rounds"; }
-  int Rounds() const override { return 2; }
+  std::string name() const override { return "passes"; }
+  int Passes() const override { return 2; }
   DepthEstimate Estimate(std::span<const StereoView>, int, std::span<const int>, const DepthRange&,
                          const EngineOptions&) const override {
-    throw Error("Estimate is not for engines with rounds");
+    throw Error("Estimate is not for engines with passes");
   }
   PlaneMap Match(std::span<const StereoView>, int reference, std::span<const int>,
                  const DepthRange&, const EngineOptions&) const override {
@@ -249,16 +249,16 @@ TEST(ComputeDepthMaps, GivenRangesReplaceThePoints) {
   EXPECT_THROW(Compute(row, engine, options, progress), UsageError);
 }
 
-TEST(RunRounds, ARoundReadsOnlyTheRoundBefore) {
+TEST(RunAllPasses, ARoundReadsOnlyTheRoundBefore) {
   RoundsEngine engine;
   Recorder progress;
   const Row row = Cameras(3);
   const ThreadLimit limit(4);
   const Results results = Compute(row, engine, Options(2, 0), progress);
   ASSERT_EQ(results.size(), 3u);
-  // By hand: w0 = 0.250, 0.251, 0.252; each round w_i += 0.1 (sum of the others).
+  // By hand: w0 = 0.250, 0.251, 0.252; each pass w_i += 0.1 (sum of the others).
   double w[3] = {0.250, 0.251, 0.252};
-  for (int round = 0; round < 2; ++round) {
+  for (int pass = 0; pass < 2; ++pass) {
     const double sum = w[0] + w[1] + w[2];
     for (double& value : w) value += 0.1 * (sum - value);
   }
@@ -266,7 +266,7 @@ TEST(RunRounds, ARoundReadsOnlyTheRoundBefore) {
   EXPECT_EQ(engine.calls, 9);
 }
 
-TEST(RunRounds, GoesOnFromWhatTheStoreHasToTheSameBytes) {
+TEST(RunAllPasses, GoesOnFromWhatTheStoreHasToTheSameBytes) {
   RoundsEngine engine;
   Recorder progress;
   const Row row = Cameras(4);
@@ -277,7 +277,7 @@ TEST(RunRounds, GoesOnFromWhatTheStoreHasToTheSameBytes) {
   DepthMapsOptions options = Options(2, 0);
   options.planes = &planes;
   Recorder impatient;
-  impatient.stop_after = 3;  // of the first round
+  impatient.stop_after = 3;  // of the first pass
   EXPECT_THROW(Compute(row, engine, options, impatient), Interrupted);
   EXPECT_EQ(engine.calls, 3);
   const Results resumed = Compute(row, engine, options, progress);
@@ -288,7 +288,7 @@ TEST(RunRounds, GoesOnFromWhatTheStoreHasToTheSameBytes) {
   }
 }
 
-TEST(RunRounds, AViewWithoutAPairHasNoPlanesForItsNeighboursEither) {
+TEST(RunAllPasses, AViewWithoutAPairHasNoPlanesForItsNeighboursEither) {
   RoundsEngine engine;
   engine.reject = 1;
   Recorder progress;

@@ -72,21 +72,21 @@ void ReadGrids(const fs::path& file, Grids&... grids) {
 /// Everything of a run on disk.
 class OnDisk final : public PlaneMapStore, public EstimateStore {
  public:
-  bool Has(int round, int view) const override { return fs::exists(Planes(round, view)); }
-  std::shared_ptr<const PlaneMap> Load(int round, int view) override {
+  bool Has(int pass, int view) const override { return fs::exists(Planes(pass, view)); }
+  std::shared_ptr<const PlaneMap> Load(int pass, int view) override {
     const int w = kCamera.width_px(), h = kCamera.height_px();
     auto map = std::make_shared<PlaneMap>(
         PlaneMap{Grid<float>(w, h), Grid<float>(w, h), Grid<float>(w, h)});
-    ReadGrids(Planes(round, view), map->inverse_depth, map->slope_x, map->slope_y);
+    ReadGrids(Planes(pass, view), map->inverse_depth, map->slope_x, map->slope_y);
     const std::lock_guard lock(mutex_);
-    map->unit_z = units_.at({round, view});
+    map->unit_z = units_.at({pass, view});
     ++loads;
     return map;
   }
-  void Save(int round, int view, PlaneMap&& map) override {
-    WriteGrids(Planes(round, view), map.inverse_depth, map.slope_x, map.slope_y);
+  void Save(int pass, int view, PlaneMap&& map) override {
+    WriteGrids(Planes(pass, view), map.inverse_depth, map.slope_x, map.slope_y);
     const std::lock_guard lock(mutex_);
-    units_[{round, view}] = map.unit_z;
+    units_[{pass, view}] = map.unit_z;
   }
   void Drop(int) override {}
   bool Has(int view) const override { return fs::exists(Estimate(view)); }
@@ -111,8 +111,8 @@ class OnDisk final : public PlaneMapStore, public EstimateStore {
   int loads = 0;
 
  private:
-  fs::path Planes(int round, int view) const {
-    return folder_ / ("planes" + std::to_string(round) + "_" + std::to_string(view));
+  fs::path Planes(int pass, int view) const {
+    return folder_ / ("planes" + std::to_string(pass) + "_" + std::to_string(view));
   }
   fs::path Estimate(int view) const { return folder_ / ("estimate" + std::to_string(view)); }
   dtr::testing::TemporaryFolder folder_;
@@ -188,15 +188,15 @@ class MemoryLimit : public ::testing::Test {
 };
 
 TEST_F(MemoryLimit, IsKeptAtTheLeastThatWorksWithTheSameBytes) {
-  for (const int rounds : {2, 0}) {
+  for (const int passes : {2, 0}) {
     const auto engine = MakeEngine(
-        "patchmatch", {.neighbours = 3, .round_neighbours = 4, .iterations = 1, .rounds = rounds});
+        "patchmatch", {.neighbours = 3, .pass_neighbours = 4, .iterations = 1, .passes = passes});
     const std::uint64_t least = Least(*engine);
     const Computed ample = Compute(*engine, 0, 2);
     const int loads_when_ample = loads_;
     {
       const Computed tight = Compute(*engine, least, 1);
-      EXPECT_LE(tight.peak_bytes, static_cast<long>(least)) << rounds << " rounds";
+      EXPECT_LE(tight.peak_bytes, static_cast<long>(least)) << passes << " passes";
       // A number that is far from what is needed would keep memory free for nothing.
       EXPECT_GE(tight.peak_bytes, static_cast<long>(0.7 * static_cast<double>(least)));
       for (int v = 0; v < kViews; ++v) {
@@ -205,7 +205,7 @@ TEST_F(MemoryLimit, IsKeptAtTheLeastThatWorksWithTheSameBytes) {
         EXPECT_EQ(tight.maps[k].inverse_depth_sigma, ample.maps[k].inverse_depth_sigma);
       }
     }
-    if (rounds > 0) {
+    if (passes > 0) {
       EXPECT_GT(ample.peak_bytes, static_cast<long>(least));
       EXPECT_GT(loads_, loads_when_ample);
     }
@@ -230,7 +230,7 @@ TEST_F(MemoryLimit, CountsPriors) {
                          {{4}, {0.05}}};
   for (StereoView& view : views_) view.prior = &prior;
   const auto engine = MakeEngine(
-      "patchmatch", {.neighbours = 3, .round_neighbours = 4, .iterations = 1, .rounds = 1});
+      "patchmatch", {.neighbours = 3, .pass_neighbours = 4, .iterations = 1, .passes = 1});
   const std::uint64_t least = Least(*engine);
   const Computed tight = Compute(*engine, least, 1);
   EXPECT_LE(tight.peak_bytes, static_cast<long>(least));

@@ -15,7 +15,7 @@
 namespace dtr::stereo {
 namespace {
 
-PageKey Planes(int view, int round = 0) { return {PageKey::Kind::kPlanes, round, view}; }
+PageKey Planes(int view, int pass = 0) { return {PageKey::Kind::kPlanes, pass, view}; }
 
 class PagesTest : public ::testing::Test {
  protected:

@@ -174,7 +174,7 @@ TEST(PatchMatchEngine, InstructionSetsThatRoundAlikeFindTheSameBytes) {
   ExpectTheSameFromAllInstructionSets(shots[0].truth, [&] { return EstimateFirst(views); });
 }
 
-/// The first view after all rounds, with every other view as everyone's neighbour.
+/// The first view after all passes, with every other view as everyone's neighbour.
 DepthEstimate AfterRounds(const std::vector<StereoView>& views, int threads = 2) {
   const ThreadLimit limit(threads);
   const auto engine = MakeEngine("patchmatch");
@@ -191,11 +191,11 @@ DepthEstimate AfterRounds(const std::vector<StereoView>& views, int threads = 2)
   for (int v = 0; v < count; ++v) {
     maps.push_back(engine->Match(views, v, others(v), kRange, {}));
   }
-  for (int round = 1; round <= engine->Rounds(); ++round, maps = std::move(next)) {
+  for (int pass = 1; pass <= engine->Passes(); ++pass, maps = std::move(next)) {
     for (size_t v = 0; v < views.size(); ++v) known[v] = &maps[v];
     next.clear();
     for (int v = 0; v < count; ++v) {
-      next.push_back(engine->Refine(views, v, others(v), kRange, known, round, {}));
+      next.push_back(engine->Refine(views, v, others(v), kRange, known, pass, {}));
     }
   }
   for (size_t v = 0; v < views.size(); ++v) known[v] = &maps[v];

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "dtr/base/machine.h"
 #include "pipeline/build/build_part.h"
 #include "pipeline/build/detail/part_files.h"
 #include "pipeline/core/run/run_log.h"
@@ -30,6 +31,7 @@ struct Stage {
 inline void RunStages(const std::vector<Stage>& stages, const std::filesystem::path& work,
                       RunLog& log) {
   for (const Stage& stage : stages) {
+    ReturnFreedMemory();  // so that the limit holds of what is in use
     log.Begin(stage.name);
     stage.run();
     if (!stage.steps || !HasParts(work)) continue;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dtr/base/memory_budget.h"
+#include "dtr/base/parallel_for.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/scene.h"
 #include "dtr/types/inverse_depth_code.h"
@@ -48,6 +49,12 @@ void Fill(const DepthImage& known, float below_z, View& view) {
   }
 }
 
+/// Views that are completed at a time, at least one. The result does not depend on it.
+int ViewsAtOnce(double room_bytes, double view_bytes) {
+  const double at_once = (room_bytes - kAlwaysAllowedBytes) / view_bytes;
+  return static_cast<int>(std::clamp<double>(at_once, 1, ThreadLimit::Current()));
+}
+
 /// Of one view, from the planes of its cells; sets its coding.
 DepthImage Completed(const stereo::CellView& cells, const stereo::CompletedCells& completed,
                      float far_z, View loaded, size_t index, const KnownCompletion& known,
@@ -84,16 +91,17 @@ std::vector<stereo::ScenePlane> CompleteDepth(DtrSet& set, const SparseScene& sp
     cameras.push_back(view.camera);
     farthest = std::max(farthest, view.far_z);
   }
-  const auto bytes = static_cast<double>(stereo::CompletionBytes(cameras));
-  if (bytes > memory_gb * kBytesPerGigabyte) {
+  const stereo::CompletionMemory needed = stereo::CompletionMemoryOf(cameras);
+  const double room_bytes = memory_gb * kBytesPerGigabyte - needed.cells_bytes;
+  if (room_bytes < needed.view_bytes) {
     progress.Note(fmt::format(
         "depth is not completed where none was measured: that takes `memory` {:.3f} (GB)",
-        bytes / kBytesPerGigabyte));
+        (needed.cells_bytes + needed.view_bytes) / kBytesPerGigabyte));
     return {};
   }
   const auto far_z = static_cast<float>(kFarthest * farthest);
   // Beside the cells, which stay until the end.
-  const double beside_gb = std::max(memory_gb - bytes / kBytesPerGigabyte, kLeastRoomGb);
+  const double beside_gb = std::max(room_bytes / kBytesPerGigabyte, kLeastRoomGb);
   std::vector<stereo::CellView> cells(sources.size());
   ForViews(views, sources, "", beside_gb, progress, [&](size_t k) {
     const auto v = static_cast<size_t>(sources[k]);
@@ -113,7 +121,8 @@ std::vector<stereo::ScenePlane> CompleteDepth(DtrSet& set, const SparseScene& sp
       NeighboursOf(views, sources, SourceScene(sparse, views, sources), kNeighbours);
   const std::vector<stereo::ScenePlane> planes =
       known.depth ? known.planes : stereo::PlanesToChoose(cells, neighbours);
-  const auto completed = stereo::CompleteCells(cells, neighbours, planes, progress);
+  const auto completed = stereo::CompleteCells(
+      cells, neighbours, planes, ViewsAtOnce(room_bytes, needed.view_bytes), progress);
   ForViews(views, sources, "completed depth", beside_gb, progress, [&](size_t k) {
     const auto v = static_cast<size_t>(sources[k]);
     const DepthImage depth = Completed(cells[k], completed[k], far_z,

@@ -274,7 +274,7 @@ DepthStageResult DepthStage(DtrSet& set, const SparseScene& sparse, const DepthC
       choice.time_budget_s ? WithinBudget(sources.stereo, scene, choice, depth_options,
                                           work / "effort.json", progress)
                            : asked;
-  if (!options.normals.empty() && (choice.engine != "patchmatch" || quality.rounds == 0)) {
+  if (!options.normals.empty() && (choice.engine != "patchmatch" || quality.passes == 0)) {
     throw UsageError(
         "`normals`: expected `engine` patchmatch with one pass or more, whose planes they are of");
   }
@@ -305,7 +305,7 @@ DepthStageResult DepthStage(DtrSet& set, const SparseScene& sparse, const DepthC
     KeepRanges({sources.stereo, scene, *engine, options}, finds_ranges, is_done, planes,
                depth_options, progress);
     if (step && finds_ranges) return;
-    if (step && step->pass <= engine->Rounds()) {
+    if (step && step->pass <= engine->Passes()) {
       return stereo::ComputeDepthPass(sources.stereo, scene, *engine, depth_options, step->pass,
                                       progress, is_done_or_others);
     }
@@ -315,7 +315,7 @@ DepthStageResult DepthStage(DtrSet& set, const SparseScene& sparse, const DepthC
           View& view = view_of(source);
           if (!options.ranges.empty()) StoreWithin(range, view);
           if (!options.normals.empty()) {
-            normals.Write(view, *planes.Load(engine->Rounds(), source), estimate);
+            normals.Write(view, *planes.Load(engine->Passes(), source), estimate);
           }
           WriteDepth(view, std::move(estimate), set.unit, writer);
         });

@@ -53,7 +53,7 @@ struct DepthStageResult {
   stereo::QualitySettings quality;  ///< that was asked for or, with a time budget, what fitted
   std::optional<DepthPriorReport> prior;
   /// What its planes were computed from, for PlaneFiles of `planes` in its work folder: those of
-  /// the last round stay there.
+  /// the last pass stay there.
   std::string planes_made_from;
 };
 

@@ -62,26 +62,26 @@ PlaneFiles::PlaneFiles(const fs::path& folder, const std::string& made_from, boo
   WriteFileAtomically(origin, made_from);
 }
 
-fs::path PlaneFiles::File(int round, int view) const {
-  return folder_ / fmt::format("round{}_view{}.planes", round, view);
+fs::path PlaneFiles::File(int pass, int view) const {
+  return folder_ / fmt::format("round{}_view{}.planes", pass, view);
 }
 
-bool PlaneFiles::Has(int round, int view) const { return Exists(File(round, view)); }
+bool PlaneFiles::Has(int pass, int view) const { return Exists(File(pass, view)); }
 
-std::shared_ptr<const stereo::PlaneMap> PlaneFiles::Load(int round, int view) {
+std::shared_ptr<const stereo::PlaneMap> PlaneFiles::Load(int pass, int view) {
   auto map = std::make_shared<stereo::PlaneMap>();
-  map->unit_z = ReadGridFile(File(round, view),
-                             std::array{&map->inverse_depth, &map->slope_x, &map->slope_y});
+  map->unit_z =
+      ReadGridFile(File(pass, view), std::array{&map->inverse_depth, &map->slope_x, &map->slope_y});
   return map;
 }
 
-void PlaneFiles::Save(int round, int view, stereo::PlaneMap&& map) {
+void PlaneFiles::Save(int pass, int view, stereo::PlaneMap&& map) {
   const std::array<const Grid<float>*, 3> grids{&map.inverse_depth, &map.slope_x, &map.slope_y};
-  WriteGridFile(File(round, view), grids, map.unit_z);
+  WriteGridFile(File(pass, view), grids, map.unit_z);
 }
 
-void PlaneFiles::Drop(int round) {
-  const std::string prefix = fmt::format("round{}_view", round);
+void PlaneFiles::Drop(int pass) {
+  const std::string prefix = fmt::format("round{}_view", pass);
   std::error_code error;
   fs::directory_iterator entry(folder_, error);
   for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {

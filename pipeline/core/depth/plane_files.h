@@ -12,7 +12,7 @@
 
 namespace dtr::pipeline {
 
-/// Planes: one file (grid_files.h) per round and view in a folder of working files: an interrupted
+/// Planes: one file (grid_files.h) per pass and view in a folder of working files: an interrupted
 /// run goes on where it stopped, and memory holds only the planes in use. Load throws Error naming
 /// the file when it is not what Save writes; so do Has and Drop where the folder cannot be read or
 /// a file not removed.
@@ -22,10 +22,10 @@ class PlaneFiles final : public stereo::PlaneMapStore {
   /// of anything else are removed or, where other processes share the folder, rejected with Error.
   PlaneFiles(const std::filesystem::path& folder, const std::string& made_from,
              bool is_shared = false);
-  bool Has(int round, int view) const override;
-  std::shared_ptr<const stereo::PlaneMap> Load(int round, int view) override;
-  void Save(int round, int view, stereo::PlaneMap&& map) override;
-  void Drop(int round) override;
+  bool Has(int pass, int view) const override;
+  std::shared_ptr<const stereo::PlaneMap> Load(int pass, int view) override;
+  void Save(int pass, int view, stereo::PlaneMap&& map) override;
+  void Drop(int pass) override;
 
   /// The depth ranges that the planes lie in, which are kept beside them.
   void SaveRanges(std::span<const stereo::DepthRange> ranges);
@@ -33,7 +33,7 @@ class PlaneFiles final : public stereo::PlaneMapStore {
   std::optional<std::vector<stereo::DepthRange>> LoadRanges(size_t views) const;
 
  private:
-  std::filesystem::path File(int round, int view) const;
+  std::filesystem::path File(int pass, int view) const;
   std::filesystem::path folder_;
 };
 

@@ -20,9 +20,9 @@ stereo::QualitySettings QualityFromJson(const std::string& text, const std::stri
     return static_cast<int>(value);
   };
   return {.neighbours = number("neighbours", 1, kMaxNeighbours),
-          .round_neighbours = number("round_neighbours", 1, kMaxNeighbours),
+          .pass_neighbours = number("pass_neighbours", 1, kMaxNeighbours),
           .iterations = number("iterations", 1, kMaxIterations),
-          .rounds = number("rounds", 0, kMaxRounds)};
+          .passes = number("passes", 0, kMaxPasses)};
 }
 
 nlohmann::ordered_json SettingsJson(const std::string& engine,
@@ -30,9 +30,9 @@ nlohmann::ordered_json SettingsJson(const std::string& engine,
   nlohmann::ordered_json settings = {{"engine", engine}};
   if (engine == "sgbm" || engine == "patchmatch") settings["neighbours"] = quality.neighbours;
   if (engine == "patchmatch") {
-    settings["round_neighbours"] = quality.round_neighbours;
+    settings["pass_neighbours"] = quality.pass_neighbours;
     settings["iterations"] = quality.iterations;
-    settings["rounds"] = quality.rounds;
+    settings["passes"] = quality.passes;
   }
   return settings;
 }

@@ -24,13 +24,13 @@ constexpr int kCoarsestSidePx = 256;
 constexpr double kFirstGuessVisits = 6;
 
 constexpr stereo::QualitySettings kLadder[] = {
-    {.neighbours = 2, .round_neighbours = 4, .iterations = 1, .rounds = 0},
-    {.neighbours = 3, .round_neighbours = 5, .iterations = 2, .rounds = 1},
-    {.neighbours = 4, .round_neighbours = 6, .iterations = 2, .rounds = 1},
-    {.neighbours = 4, .round_neighbours = 8, .iterations = 3, .rounds = 2},
-    {.neighbours = 5, .round_neighbours = 8, .iterations = 3, .rounds = 2},
-    {.neighbours = 6, .round_neighbours = 8, .iterations = 4, .rounds = 2},
-    {.neighbours = 8, .round_neighbours = 8, .iterations = 5, .rounds = 3},
+    {.neighbours = 2, .pass_neighbours = 4, .iterations = 1, .passes = 0},
+    {.neighbours = 3, .pass_neighbours = 5, .iterations = 2, .passes = 1},
+    {.neighbours = 4, .pass_neighbours = 6, .iterations = 2, .passes = 1},
+    {.neighbours = 4, .pass_neighbours = 8, .iterations = 3, .passes = 2},
+    {.neighbours = 5, .pass_neighbours = 8, .iterations = 3, .passes = 2},
+    {.neighbours = 6, .pass_neighbours = 8, .iterations = 4, .passes = 2},
+    {.neighbours = 8, .pass_neighbours = 8, .iterations = 5, .passes = 3},
 };
 
 int LevelsOf(const PinholeCamera& camera) {
@@ -107,16 +107,16 @@ ProbedCosts ProbeCosts(const stereo::Collection& c, int view) {
                       small[i].camera.height_px() == small[0].camera.height_px();
     pointers.push_back(fits ? &maps[0] : nullptr);
   }
-  costs.round_s =
+  costs.pass_s =
       SecondsOf([&] { engine->Refine(views, 0, others, range, pointers, 1, c.options); });
   costs.check_s = SecondsOf([&] { engine->Filter(views, 0, others, range, pointers, c.options); });
   const double pixels = PixelsOf(small[0].camera);
   const double available = static_cast<double>(others.size());
   const double searched = std::min<double>(kProbeQuality.neighbours, available);
-  const double asked = std::min<double>(kProbeQuality.round_neighbours, available);
+  const double asked = std::min<double>(kProbeQuality.pass_neighbours, available);
   costs.search_s /=
       pixels * searched * VisitsPerPixel(kProbeQuality.iterations, LevelsOf(small[0].camera));
-  costs.round_s /= pixels * asked;
+  costs.pass_s /= pixels * asked;
   costs.check_s /= pixels * asked;
   return costs;
 }
@@ -125,7 +125,7 @@ double PredictSeconds(const ProbedCosts& costs, const stereo::QualitySettings& q
                       std::span<const stereo::StereoView> views) {
   const double others = static_cast<double>(views.size()) - 1;
   const double searched = std::min<double>(quality.neighbours, others);
-  const double asked = std::min<double>(quality.round_neighbours, others);
+  const double asked = std::min<double>(quality.pass_neighbours, others);
   double seconds = 0;
   for (const stereo::StereoView& view : views) {
     const double visits = VisitsPerPixel(quality.iterations, LevelsOf(view.camera));
@@ -137,7 +137,7 @@ double PredictSeconds(const ProbedCosts& costs, const stereo::QualitySettings& q
                std::min<double>(stereo::kLookNeighbours, std::max(searched, asked)) *
                VisitsPerPixel(quality.iterations, 1);
     seconds += PixelsOf(view.camera) * (costs.search_s * searched * visits +
-                                        (costs.round_s * quality.rounds + costs.check_s) * asked);
+                                        (costs.pass_s * quality.passes + costs.check_s) * asked);
   }
   return seconds;
 }
@@ -166,7 +166,7 @@ stereo::QualitySettings QualityWithinBudget(const stereo::Collection& c, const D
     const double expected_s = PredictSeconds(*costs, quality, c.views);
     progress.Note(fmt::format(
         "time budget {} s: {} neighbours, {} in {} passes, {} iterations; expected {:.1f} s{}",
-        *choice.time_budget_s, quality.neighbours, quality.round_neighbours, quality.rounds,
+        *choice.time_budget_s, quality.neighbours, quality.pass_neighbours, quality.passes,
         quality.iterations, expected_s,
         expected_s > *choice.time_budget_s ? ", MORE than the budget: nothing cheaper is left"
                                            : ""));

@@ -7,7 +7,7 @@
 #include "dtr/base/progress.h"
 #include "pipeline/core/depth_settings.h"
 #include "stereo/engine.h"
-#include "stereo/rounds.h"
+#include "stereo/geometric_passes.h"
 
 namespace dtr::pipeline {
 
@@ -16,7 +16,7 @@ namespace dtr::pipeline {
 /// its visits per pixel, a pass and the final filter in proportion to theirs.
 struct ProbedCosts {
   double search_s = 0;  ///< per pixel, neighbour and visit
-  double round_s = 0;   ///< per pixel and neighbour
+  double pass_s = 0;    ///< per pixel and neighbour
   double check_s = 0;   ///< per pixel and neighbour
 };
 

@@ -136,13 +136,13 @@ std::uint64_t TimeStepBytesOf(const std::vector<View>& views) {
 TimeStepReader::TimeStepReader(const BackgroundViews& backgrounds, std::vector<View> views,
                                const io::SetWriter& writer,
                                stereo::PlaneMapStore& background_planes,
-                               stereo::PlaneMapStore* before, int round, std::uint64_t cache_bytes)
+                               stereo::PlaneMapStore* before, int pass, std::uint64_t cache_bytes)
     : backgrounds_(backgrounds),
       views_(std::move(views)),
       writer_(writer),
       background_planes_(background_planes),
       before_(before),
-      round_(round),
+      pass_(pass),
       caches_(TimeStepBytesOf(views_) <= cache_bytes) {}
 
 std::vector<stereo::TimeStepSource> TimeStepReader::Sources() {
@@ -182,8 +182,8 @@ std::shared_ptr<const stereo::TimeStep> TimeStepReader::Read(size_t view) {
   time_step->open = OpenPixels(behind, now, writer_);
   time_step->settled = {std::move(behind.depth), std::move(*behind.inverse_depth_sigma)};
   const int source = static_cast<int>(view);
-  time_step->background = *background_planes_.Load(round_, source);
-  if (before_ != nullptr) time_step->before = *before_->Load(round_, source);
+  time_step->background = *background_planes_.Load(pass_, source);
+  if (before_ != nullptr) time_step->before = *before_->Load(pass_, source);
   return time_step;
 }
 

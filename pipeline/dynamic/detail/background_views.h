@@ -40,11 +40,11 @@ inline constexpr size_t kLeastTimeSteps = 3;
 class TimeStepReader {
  public:
   /// `views`: the source views of the time step, whose images `writer` has; `before`: planes of the
-  /// last `round` of the time step before, null for the first. Time steps that are read stay in
+  /// last `pass` of the time step before, null for the first. Time steps that are read stay in
   /// memory where all together take at most `cache_bytes`.
   TimeStepReader(const BackgroundViews& backgrounds, std::vector<View> views,
                  const io::SetWriter& writer, stereo::PlaneMapStore& background_planes,
-                 stereo::PlaneMapStore* before, int round, std::uint64_t cache_bytes);
+                 stereo::PlaneMapStore* before, int pass, std::uint64_t cache_bytes);
 
   /// One for each source view; they borrow this.
   std::vector<stereo::TimeStepSource> Sources();
@@ -60,7 +60,7 @@ class TimeStepReader {
   const io::SetWriter& writer_;
   stereo::PlaneMapStore& background_planes_;
   stereo::PlaneMapStore* before_;
-  int round_;
+  int pass_;
   bool caches_ = false;
   std::mutex mutex_;
   std::map<size_t, std::shared_ptr<const stereo::TimeStep>> cached_;

@@ -144,11 +144,11 @@ class TemporalDepth {
     TakeFromBackground(views);
     std::optional<PlaneFiles> before;
     if (step > 0) before.emplace(Work(StepName(step - 1)) / "planes", made_from);
-    const int round = options_.quality.rounds;
-    if (before && !HasAll(*before, round)) before.reset();  // its views are all done
+    const int pass = options_.quality.passes;
+    if (before && !HasAll(*before, pass)) before.reset();  // its views are all done
     const double memory_gb = options_.depth.memory_gb.value_or(kDefaultMemoryGb);
     TimeStepReader reader(backgrounds_, SourceViews(views), writer_, background_planes,
-                          before ? &*before : nullptr, round,
+                          before ? &*before : nullptr, pass,
                           static_cast<std::uint64_t>(kCacheShare * memory_gb * kBytesPerGigabyte));
     DepthStageOptions stage;
     stage.seed = options_.seed;
@@ -165,9 +165,9 @@ class TemporalDepth {
     return reader.OpenShare();
   }
 
-  bool HasAll(const PlaneFiles& planes, int round) const {
+  bool HasAll(const PlaneFiles& planes, int pass) const {
     for (size_t i = 0; i < sources_.size(); ++i) {
-      if (!planes.Has(round, static_cast<int>(i))) return false;
+      if (!planes.Has(pass, static_cast<int>(i))) return false;
     }
     return true;
   }

@@ -1,4 +1,4 @@
-#include "stereo/rounds.h"
+#include "stereo/geometric_passes.h"
 
 #include <algorithm>
 #include <string>
@@ -13,17 +13,17 @@ const std::vector<int>& NeighboursOf(const Collection& c, int view) {
   return c.neighbours[static_cast<size_t>(view)].views;
 }
 
-/// Which views each round must still compute: what the next one lacks needs all around it.
+/// Which views each pass must still compute: what the next one lacks needs all around it.
 std::vector<std::vector<int>> Missing(const Collection& c, std::span<const int> needed,
                                       const PlaneMapStore& store) {
-  const int rounds = c.engine->Rounds();
-  std::vector<std::vector<int>> missing(static_cast<size_t>(rounds) + 1);
+  const int passes = c.engine->Passes();
+  std::vector<std::vector<int>> missing(static_cast<size_t>(passes) + 1);
   std::vector<bool> wanted(c.views.size(), false);
   for (const int v : needed) wanted[static_cast<size_t>(v)] = true;
-  for (int round = rounds; round >= 0; --round) {
-    std::vector<int>& here = missing[static_cast<size_t>(round)];
+  for (int pass = passes; pass >= 0; --pass) {
+    std::vector<int>& here = missing[static_cast<size_t>(pass)];
     for (int v = 0; v < static_cast<int>(wanted.size()); ++v) {
-      if (wanted[static_cast<size_t>(v)] && !store.Has(round, v)) here.push_back(v);
+      if (wanted[static_cast<size_t>(v)] && !store.Has(pass, v)) here.push_back(v);
     }
     wanted.assign(wanted.size(), false);
     for (const int v : here) {
@@ -49,12 +49,12 @@ PlaneMap First(const Collection& c, int view, std::string* note) {
   }
 }
 
-PlaneMap Next(const Collection& c, PlaneMapStore& store, int round, int view) {
-  const PlanesAround around(c, store, round - 1, view);
+PlaneMap Next(const Collection& c, PlaneMapStore& store, int pass, int view) {
+  const PlanesAround around(c, store, pass - 1, view);
   if (!around.HasOwn()) return {};
   const Room room(c, view);
   return c.engine->Refine(room.views(), view, NeighboursOf(c, view),
-                          c.ranges[static_cast<size_t>(view)], around.maps(), round, c.options);
+                          c.ranges[static_cast<size_t>(view)], around.maps(), pass, c.options);
 }
 
 }  // namespace
@@ -65,12 +65,12 @@ Room::Room(const Collection& c, int view)
       work_(c.pages != nullptr ? *c.pages : unlimited_,
             c.engine->WorkBytes(c.views, view, NeighboursOf(c, view))) {}
 
-PlanesAround::PlanesAround(const Collection& collection, PlaneMapStore& store, int round, int view)
+PlanesAround::PlanesAround(const Collection& collection, PlaneMapStore& store, int pass, int view)
     : maps_(collection.views.size(), nullptr), own_(static_cast<size_t>(view)) {
   std::vector<int> around = NeighboursOf(collection, view);
   around.push_back(view);
   for (const int v : around) {
-    held_.push_back(store.Load(round, v));
+    held_.push_back(store.Load(pass, v));
     const PlaneMap& map = *held_.back();
     const PinholeCamera& camera = collection.views[static_cast<size_t>(v)].camera;
     for (const Grid<float>* grid : {&map.inverse_depth, &map.slope_x, &map.slope_y}) {
@@ -88,7 +88,7 @@ PlanesAround::PlanesAround(const Collection& collection, PlaneMapStore& store, i
 
 void RequirePass(const Collection& c, std::span<const int> views, const PlaneMapStore& store,
                  int pass) {
-  if (c.engine->Rounds() == 0) return;
+  if (c.engine->Passes() == 0) return;
   for (const int view : views) {
     std::vector<int> around = NeighboursOf(c, view);
     around.push_back(view);
@@ -121,12 +121,12 @@ void RunPass(const Collection& collection, std::span<const int> views, PlaneMapS
              });
 }
 
-void RunRounds(const Collection& collection, std::span<const int> needed, PlaneMapStore& store,
-               Progress& progress) {
+void RunAllPasses(const Collection& collection, std::span<const int> needed, PlaneMapStore& store,
+                  Progress& progress) {
   const std::vector<std::vector<int>> missing = Missing(collection, needed, store);
-  for (int round = 0; round < static_cast<int>(missing.size()); ++round) {
-    RunPass(collection, missing[static_cast<size_t>(round)], store, round, progress);
-    if (round > 0) store.Drop(round - 1);
+  for (int pass = 0; pass < static_cast<int>(missing.size()); ++pass) {
+    RunPass(collection, missing[static_cast<size_t>(pass)], store, pass, progress);
+    if (pass > 0) store.Drop(pass - 1);
   }
 }
 

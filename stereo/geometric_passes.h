@@ -1,4 +1,4 @@
-// stereo/rounds.h -- planes of a collection, round after round.
+// stereo/geometric_passes.h -- planes of a collection, pass after pass.
 #pragma once
 #include <functional>
 #include <span>
@@ -37,7 +37,7 @@ class Room {
 /// The planes that concern one view: its own and its neighbours', kept alive.
 class PlanesAround {
  public:
-  PlanesAround(const Collection& collection, PlaneMapStore& store, int round, int view);
+  PlanesAround(const Collection& collection, PlaneMapStore& store, int pass, int view);
   /// One entry per view of the collection; null where there are no planes or the view is none of
   /// these.
   std::span<const PlaneMap* const> maps() const { return maps_; }
@@ -49,18 +49,18 @@ class PlanesAround {
   size_t own_;
 };
 
-/// Sees to it that `store` has the planes of the engine's last round for all `needed` views. A
-/// round of a view reads only the round before, so the order of views has no influence; what the
+/// Sees to it that `store` has the planes of the engine's last pass for all `needed` views. A
+/// pass of a view reads only the pass before, so the order of views has no influence; what the
 /// store has already is not computed again. As many views are worked on at a time as the pages have
 /// room for (ViewsAtOnce), one always. A view without neighbours, or for which the
 /// engine finds no usable pair, gets empty planes and a note. Throws what the engine throws, and
 /// Interrupted between views.
-void RunRounds(const Collection& collection, std::span<const int> needed, PlaneMapStore& store,
-               Progress& progress);
+void RunAllPasses(const Collection& collection, std::span<const int> needed, PlaneMapStore& store,
+                  Progress& progress);
 
 /// One pass (0: the search) of these views alone: what `store` has already is not computed again.
 /// The pass before must be there, of their neighbours too: throws Error as RequirePass; else as
-/// RunRounds.
+/// RunAllPasses.
 void RunPass(const Collection& collection, std::span<const int> views, PlaneMapStore& store,
              int pass, Progress& progress);
 

@@ -1,4 +1,4 @@
-// stereo/patchmatch/trust.h -- which pixels' planes are believed, and how much.
+// stereo/patchmatch/depth_filter.h -- which pixels' planes are believed, and how much.
 #pragma once
 #include "stereo/engine.h"
 #include "stereo/patchmatch/kernel.h"
@@ -13,7 +13,7 @@ namespace dtr::stereo::patchmatch {
 /// `state` if the photos say no more against it. `planes_left_out`: hardly a pixel asks for that,
 /// and no planes were fitted. With `time_step` (that of level.open) settled pixels keep their
 /// depth, and open ones alone are asked.
-DepthEstimate TrustedDepth(const Level& level, const StereoView& view, const DepthRange& range,
-                           const TimeStep* time_step, State* state, bool* planes_left_out);
+DepthEstimate FilteredDepth(const Level& level, const StereoView& view, const DepthRange& range,
+                            const TimeStep* time_step, State* state, bool* planes_left_out);
 
 }  // namespace dtr::stereo::patchmatch

@@ -1,4 +1,4 @@
-#include "stereo/patchmatch/trust.h"
+#include "stereo/patchmatch/depth_filter.h"
 
 #include <algorithm>
 #include <atomic>
@@ -23,7 +23,7 @@ struct Limits {
 /// One view is enough: what no second one sees, or sees elsewhere, the check against the
 /// neighbours' maps takes out.
 constexpr Limits kAfterSearch{0.8f, 1.0f, 1};
-/// Rounds have settled the planes by what all views know: looks may differ more. On plaza, share of
+/// Passes have settled the planes by what all views know: looks may differ more. On plaza, share of
 /// all true pixels within 1 % and outliers after all checks: 79.8 % and 1.1 % with the limits
 /// above, 84.2 % and 2.8 % with these (4 px then, of sigmas that were 0.8 times as large).
 constexpr Limits kAfterRounds{1.0f, 5.0f, 0};
@@ -137,10 +137,10 @@ bool HasSurfaces(const Level& level) {
 }
 
 /// The validation results on all pixels of a view, as they come about.
-class Trust {
+class DepthFilter {
  public:
-  Trust(const Level& level, const StereoView& view, const DepthRange& range,
-        const TimeStep* time_step, State* state)
+  DepthFilter(const Level& level, const StereoView& view, const DepthRange& range,
+              const TimeStep* time_step, State* state)
       : level_(level),
         view_(view),
         near_z_(range.near_z),
@@ -150,7 +150,7 @@ class Trust {
         result_{DepthImage(width(), height()), Grid<float>(width(), height())} {}
 
   /// By what the images say of each pixel alone, and of whole areas.
-  void BelieveWhatIsSeen() {
+  void KeepConsistent() {
     const Limits limits = HasSurfaces(level_) ? kAfterRounds : kAfterSearch;
     Grid<std::uint8_t> consistent(width(), height());
     ParallelFor(0, height(), [&](int y) {
@@ -181,7 +181,7 @@ class Trust {
   /// Gives a depth to what has none, and a better one to what is vague, where the planes around
   /// lead to one that the images do not speak against. False, and nothing is done, where that
   /// could be of use to hardly a pixel.
-  bool AskThePlanesAround() {
+  bool FillFromPlanarPrior() {
     std::atomic<std::int64_t> doubtful{0};
     ParallelFor(0, height(), [&](int y) {
       std::int64_t in_row = 0;
@@ -214,7 +214,7 @@ class Trust {
 
   /// Where another instrument has measured depth: gives it to pixels that the photos leave
   /// undecided, and makes vague depths that agree with it surer. Depths that contradict it stay.
-  void AskTheInstrument() {
+  void FillFromDepthPrior() {
     if (!level_.expected) return;
     ParallelFor(0, height(), [&](int y) {
       std::vector<float> vague(static_cast<size_t>(width()), 0);
@@ -308,15 +308,15 @@ class Trust {
 
 }  // namespace
 
-DepthEstimate TrustedDepth(const Level& level, const StereoView& view, const DepthRange& range,
-                           const TimeStep* time_step, State* state, bool* planes_left_out) {
-  Trust trust(level, view, range, time_step, state);
-  trust.BelieveWhatIsSeen();
-  trust.AskTheInstrument();
+DepthEstimate FilteredDepth(const Level& level, const StereoView& view, const DepthRange& range,
+                            const TimeStep* time_step, State* state, bool* planes_left_out) {
+  DepthFilter filter(level, view, range, time_step, state);
+  filter.KeepConsistent();
+  filter.FillFromDepthPrior();
   int passes = 0;
-  while (passes < kPriorPasses && trust.AskThePlanesAround()) ++passes;
+  while (passes < kPriorPasses && filter.FillFromPlanarPrior()) ++passes;
   *planes_left_out = passes == 0;
-  return trust.TakeResult();
+  return filter.TakeResult();
 }
 
 }  // namespace dtr::stereo::patchmatch
