@@ -52,7 +52,7 @@ const CalledApp* CallerOf(const CLI::App& app) {
   return dynamic_cast<const CalledApp*>(root);
 }
 
-/// The exit code of `act`, whose trace is written even if it throws: what failed is to be looked at.
+/// The exit code of `act`, whose trace is written even if it throws.
 template <typename Act>
 int Traced(const std::filesystem::path& file, const Act& act) {
   trace::Begin();

@@ -4,6 +4,8 @@
 
 #include <vector>
 
+#include "cli/option_text.h"
+
 namespace dtr::cli {
 namespace {
 
@@ -12,46 +14,6 @@ std::vector<const CLI::App*> Commands(const CLI::App& app) {
   return app.get_subcommands([](const CLI::App* command) {
     return !command->get_group().empty() && !command->get_name().empty();
   });
-}
-
-// CLI11 keeps a group of options of which one must be given as a command without a name.
-std::vector<const CLI::App*> Groups(const CLI::App& app) {
-  return app.get_subcommands([](const CLI::App* command) { return command->get_name().empty(); });
-}
-
-// Visible options in the order they were added; positionals apart from those with a dash.
-std::vector<const CLI::Option*> Options(const CLI::App& app, bool positional) {
-  return app.get_options([positional](const CLI::Option* option) {
-    return !option->get_group().empty() && option->get_positional() == positional;
-  });
-}
-
-// Of such a group, but for the help that CLI11 gives it, too.
-std::vector<const CLI::Option*> OptionsOfGroup(const CLI::App& group) {
-  std::vector<const CLI::Option*> options = Options(group, false);
-  std::erase(options, group.get_help_ptr());
-  return options;
-}
-
-// "-o,--output" as CLI11 joins the names of an option.
-std::vector<std::string> Names(const CLI::Option& option) {
-  std::vector<std::string> names;
-  for (const std::string& name : option.get_snames()) names.push_back("-" + name);
-  for (const std::string& name : option.get_lnames()) names.push_back("--" + name);
-  return names;
-}
-
-// The closed list in a type name such as "TEXT:{mesh,splat}"; empty without one.
-std::string Choices(const CLI::Option& option) {
-  const std::string type = option.get_type_name();
-  const auto from = type.find('{');
-  const auto to = type.find('}', from);
-  if (from == std::string::npos || to == std::string::npos) return "";
-  std::string list = type.substr(from + 1, to - from - 1);
-  for (char& letter : list) {
-    if (letter == ',') letter = ' ';
-  }
-  return list;
 }
 
 // Plain text as roff: no escapes, no line that starts as a request, hyphens that can be copied.
@@ -72,23 +34,12 @@ std::string Roff(const std::string& text) {
   return out;
 }
 
-// The type as it was declared: CLI11 puts behind it what a value is checked for ("N:INT in [0 -
-// 9]"), and ours may have a colon of their own ("every:N|NAME,...").
-std::string TypeOf(const CLI::Option& option) {
-  std::string type = option.get_type_name();
-  for (const char* check : {":INT", ":UINT", ":FLOAT", ":POSITIVE", ":NONNEGATIVE", ":NUMBER", ":{",
-                            ":DIR", ":FILE", ":PATH", ":TEXT"}) {
-    type = type.substr(0, type.find(check));
-  }
-  return type;
-}
-
 std::string OptionEntry(const CLI::Option& option) {
-  std::string names = option.get_positional() ? option.get_name(true)
-                                              : fmt::format("{}", fmt::join(Names(option), ", "));
+  std::string names = option.nonpositional() ? fmt::format("{}", fmt::join(NamesOf(option), ", "))
+                                             : option.get_name(true);
   std::string entry = ".TP\n.B " + Roff(names);
   // A flag takes no value; its type says nothing.
-  if (!option.get_positional() && option.get_items_expected_max() > 0) {
+  if (option.nonpositional() && option.get_items_expected_max() > 0) {
     entry += " " + Roff(TypeOf(option));
   }
   if (option.get_required()) entry += " (required)";
@@ -98,12 +49,11 @@ std::string OptionEntry(const CLI::Option& option) {
 
 void AppendCommand(const CLI::App& command, const std::string& called, std::string& page) {
   page += fmt::format(".SS \"{}\"\n{}\n", Roff(called), Roff(command.get_description()));
-  for (const bool positional : {true, false}) {
-    for (const CLI::Option* option : Options(command, positional)) page += OptionEntry(*option);
-  }
-  for (const CLI::App* group : Groups(command)) {
-    for (const CLI::Option* option : OptionsOfGroup(*group)) page += OptionEntry(*option);
-  }
+  const auto positionals = command.get_options([](const CLI::Option* option) {
+    return !option->get_group().empty() && !option->nonpositional();
+  });
+  for (const CLI::Option* option : positionals) page += OptionEntry(*option);
+  for (const CLI::Option* option : OptionsOf(command)) page += OptionEntry(*option);
   if (!command.get_footer().empty()) {
     page += ".PP\n.nf\n" + Roff(command.get_footer()) + "\n.fi\n";
   }
@@ -117,16 +67,12 @@ void AppendWords(const CLI::App& app, const std::string& called, std::string& wo
                  std::string& choices) {
   std::vector<std::string> list;
   for (const CLI::App* command : Commands(app)) list.push_back(command->get_name());
-  std::vector<const CLI::Option*> options = Options(app, false);
-  for (const CLI::App* group : Groups(app)) {
-    const auto more = OptionsOfGroup(*group);
-    options.insert(options.end(), more.begin(), more.end());
-  }
-  for (const CLI::Option* option : options) {
-    for (const std::string& name : Names(*option)) {
+  for (const CLI::Option* option : OptionsOf(app)) {
+    const std::vector<std::string> values = ChoicesOf(*option);
+    for (const std::string& name : NamesOf(*option)) {
       list.push_back(name);
-      const std::string values = Choices(*option);
-      if (!values.empty()) choices += fmt::format("    ['{} {}']='{}'\n", called, name, values);
+      if (values.empty()) continue;
+      choices += fmt::format("    ['{} {}']='{}'\n", called, name, fmt::join(values, " "));
     }
   }
   words += fmt::format("    ['{}']='{}'\n", called, fmt::join(list, " "));

@@ -109,25 +109,23 @@ pipeline::ScaleDistance DistanceFrom(const std::string& text, DistanceEnds ends)
 CLI::Option* AddGpsFlag(CLI::App& command, bool& gps) {
   return command.add_flag(
       "--gps", gps,
-      "Constrain cameras to the positions in the photos' EXIF: cameras "
-      "in metres east, north and up; positions that do not determine the scale only "
-      "rotate and translate what --distance scales");
+      "Constrain cameras to the photos' EXIF positions: metres east, north, up; positions that do "
+      "not determine the scale orient what --distance scales");
 }
 
 CLI::Option* AddMetreOptions(CLI::App& command, CLI::Option& gps, MetreWords& words) {
   command
       .add_option_function<std::string>(
           "--gps-sigma", [&words](const std::string& word) { words.gps_sigma = word; },
-          "Standard deviation of these positions per axis, on the map and in height, instead of "
-          "what "
+          "Standard deviation of GPS positions per axis, on the map and in height, instead of what "
           "EXIF gives or the positions themselves show")
       ->needs(&gps)
       ->type_name("M[,V]");
   return command
       .add_option(
           "--distance", words.distances,
-          "A measured distance between the cameras of photos A and B, a constraint; LENGTH as "
-          "2.5m, or 2.5m+-5mm with its standard deviation; may be given more than once")
+          "Measured distance between the cameras of photos A and B, as 2.5m or, with its standard "
+          "deviation, 2.5m+-5mm; repeatable")
       ->type_name("A,B=LENGTH");
 }
 

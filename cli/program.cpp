@@ -17,6 +17,7 @@
 
 #include "cli/arguments.h"
 #include "cli/command.h"
+#include "cli/help.h"
 #include "cli/option_names.h"
 #include "cli/standard_output.h"
 #include "cli/suggestions.h"
@@ -29,6 +30,8 @@ int Run(int argc, char** argv) {
   CLI::App app("dtr -- Depth + Texture Representation: photos in, novel views out", "dtr");
   app.set_version_flag("--version", DTR_VERSION);
   app.require_subcommand(1);
+  app.formatter(std::make_shared<HelpFormatter>());
+  app.set_help_all_flag("--help-all", "Print all options");
   AddCallableCommands(app);
   if constexpr (DTR_WITH_BATCH) AddBatchCommand(app);
 #ifdef DTR_WITH_WINDOWS

@@ -7,6 +7,7 @@
 
 #include "cli/arguments.h"
 #include "cli/command.h"
+#include "cli/option_text.h"
 #include "cli/suggestions.h"
 #include "dtr/base/error.h"
 
@@ -16,18 +17,6 @@ namespace {
 // Commands below one, without its groups of options, which have no name.
 std::vector<CLI::App*> CommandsBelow(CLI::App& app) {
   return app.get_subcommands([](const CLI::App* one) { return !one->get_name().empty(); });
-}
-
-// The options of a command, those of its groups included.
-std::vector<const CLI::Option*> OptionsOf(const CLI::App& command) {
-  auto options =
-      command.get_options([](const CLI::Option* option) { return option->nonpositional(); });
-  for (const CLI::App* group :
-       command.get_subcommands([](const CLI::App* one) { return one->get_name().empty(); })) {
-    const auto more = OptionsOf(*group);
-    options.insert(options.end(), more.begin(), more.end());
-  }
-  return options;
 }
 
 // The command that the first words name, and how many they are.
@@ -71,7 +60,7 @@ const CLI::Option* OptionCalled(const CLI::App& command, const std::string& name
   for (const CLI::Option* option : OptionsOf(command)) {
     if (option->get_lnames().empty()) continue;
     std::string known = option->get_lnames().front();
-    if (known == "help" || known == "json" || known.starts_with("no-")) continue;
+    if (known.starts_with("help") || known == "json" || known.starts_with("no-")) continue;
     std::replace(known.begin(), known.end(), '-', '_');
     names.push_back(known);
   }
@@ -99,7 +88,8 @@ void AppendOption(const CLI::App& command, const NamedOption& given,
   const bool is_default = option == nullptr && given.kind == NamedOption::Kind::kOn &&
                           OptionCalled(command, "no-" + name) != nullptr;
   if (is_default) return;
-  if (option == nullptr || name == "json" || name == "help") RejectOption(command, given.name);
+  const bool is_callable = option != nullptr && name != "json" && !name.starts_with("help");
+  if (!is_callable) RejectOption(command, given.name);
   const bool is_flag = option->get_items_expected_max() == 0;
   if (is_flag != (given.kind == NamedOption::Kind::kOn)) {
     throw UsageError(fmt::format("{}: `{}`: expected {}", command.get_name(), given.name,

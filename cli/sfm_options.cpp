@@ -67,9 +67,8 @@ CLI::Option* AddSfmOptions(CLI::App& command, pipeline::SfmChoice& choice) {
       .add_option_function<std::string>(
           "--camera-per",
           [&choice, sharing](const std::string& name) { choice.camera_per = sharing.at(name); },
-          "Photos that share intrinsics: those of a folder, none, or all of equal size and "
-          "orientation [auto: equal EXIF data and size; over several folders where held-out "
-          "observations do not ask for intrinsics per folder]")
+          "Photos that share intrinsics: of a folder, none, or of equal size and orientation "
+          "[auto: equal EXIF and size; folder where held-out observations need it]")
       ->check(CLI::IsMember({"auto", "folder", "photo", "set"}))
       ->type_name("auto|folder|photo|set");
 }

@@ -5,8 +5,11 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <iterator>
 #include <string_view>
+
+#include "cli/shell_words.h"
 
 namespace dtr::cli {
 namespace {
@@ -54,6 +57,22 @@ const CLI::App* CommandCalled(const CLI::App& app, const std::string& name) {
   const auto found = app.get_subcommands(
       [&](const CLI::App* one) { return !one->get_name().empty() && one->get_name() == name; });
   return found.empty() ? nullptr : found.front();
+}
+
+// Returns the command for a set or a folder in the place of one, "" for anything else.
+std::string CommandFor(const std::string& word, const std::vector<std::string>& commands) {
+  std::filesystem::path path(word);
+  if (!path.has_filename()) path = path.parent_path();
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(path, ignored)) return "";
+  std::vector<std::string> line = {"dtr", "build", word, "-o", "NAME.dtr"};
+  const bool is_set = path.extension() == ".dtr";
+  if (is_set) {
+    const bool has_window = std::find(commands.begin(), commands.end(), "view") != commands.end();
+    line = {"dtr", has_window ? "view" : "info", word};
+  }
+  return fmt::format("expected a command, found the {} '{}'; {} {}", is_set ? "set" : "folder",
+                     word, ShellLine(line), is_set ? "shows it" : "makes a set of its photos");
 }
 
 // The command that the first words call, and how many they are.
@@ -131,8 +150,9 @@ std::vector<std::string> CommandNames(const CLI::App& app) {
 std::vector<std::string> WithHelpAsOption(std::vector<std::string> words) {
   if (words.empty() || words.front() != "help") return words;
   words.erase(words.begin());
+  const bool all = std::erase(words, "--all") + std::erase(words, "--help-all") > 0;
   std::erase_if(words, [](const std::string& word) { return word.starts_with('-'); });
-  words.emplace_back("--help");
+  words.emplace_back(all ? "--help-all" : "--help");
   return words;
 }
 
@@ -143,6 +163,9 @@ std::string UnknownCommand(const CLI::App& app, const std::vector<std::string>& 
   if (names.empty() || command->get_allow_extras() || count == words.size() ||
       words[count].starts_with('-')) {
     return "";
+  }
+  if (count == 0 && BuiltWithout(words[0]).empty() && Nearest(words[0], names).empty()) {
+    if (std::string line = CommandFor(words[0], names); !line.empty()) return line;
   }
   return NoCommandCalled({words.begin(), words.begin() + static_cast<long>(count) + 1}, names);
 }

@@ -6,9 +6,10 @@ set(DTR_SITE_PAGES README.md
   docs/TUTORIAL.md docs/CAPTURE.md docs/IMPORT.md docs/DYNAMIC.md docs/VIEWER.md docs/EXPORT.md docs/PRUNING.md
   docs/PYTHON.md docs/PACKAGES.md docs/OSG.md
   docs/CALIBRATION.md docs/VALIDATION.md docs/BENCH.md
-  docs/METHODS.md docs/RENDER_SPEC.md docs/FORMAT.md docs/CONVENTIONS.md docs/ARCHITECTURE.md docs/ERRORS.md
-  docs/ACCURACY.md docs/accuracy/CAMERAS.md docs/accuracy/DEPTH.md docs/accuracy/RENDERING.md docs/accuracy/SPEED.md
-  docs/STABILITY.md docs/SECURITY.md docs/FUZZING.md docs/SANITIZERS.md docs/FIELD_CASES.md
+  docs/METHODS.md docs/RENDER_SPEC.md docs/FORMAT.md docs/CONVENTIONS.md docs/ARCHITECTURE.md
+  docs/ACCURACY.md docs/accuracy/CAMERAS.md docs/accuracy/CALIBRATION.md docs/accuracy/DEPTH.md docs/accuracy/RENDERING.md docs/accuracy/SPEED.md
+  docs/accuracy/TRIED.md
+  docs/measurements/stability.md docs/SECURITY.md docs/FIELD_CASES.md
   docs/BACKGROUND.md datasets/plaza/README.md CONTRIBUTING.md CHANGELOG.md)
 file(GLOB_RECURSE pages RELATIVE ${PROJECT_SOURCE_DIR} CONFIGURE_DEPENDS docs/*.md)
 list(REMOVE_ITEM pages ${DTR_SITE_PAGES})

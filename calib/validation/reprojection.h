@@ -16,7 +16,8 @@
 namespace dtr::calib {
 
 /// What a calibration must reach. The defaults were chosen between what honest models of real
-/// photos give and what the smallest fault in the tests gives; docs/VALIDATION.md has both.
+/// photos give and what the smallest fault in the tests gives; docs/accuracy/CALIBRATION.md has
+/// both.
 struct ValidateLimits {
   double max_rms_px = 1.5;          ///< held-out residuals, all cameras together
   double max_camera_rms_px = 3.0;   ///< the same for the worst camera

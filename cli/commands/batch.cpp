@@ -185,9 +185,7 @@ void AddStateCommands(CLI::App& batch) {
 }  // namespace
 
 void AddBatchCommand(CLI::App& app) {
-  AddCommand(app, "batch",
-             "Build a D+TR set as jobs, of Slurm or here: `dtr batch PHOTOS -o SET.dtr` with every "
-             "option of dtr build",
+  AddCommand(app, "batch", "dtr build PHOTOS -o SET.dtr as jobs of Slurm or processes here",
              "dtr batch photos/ -o scene.dtr --holdout every:8 --slurm --partition long",
              [](CLI::App& command) -> Action {
                auto arguments = std::make_shared<BatchArguments>();

@@ -150,9 +150,8 @@ int RunCalibrateRig(const CalibrateRigArguments& options, const Context& context
 void AddCalibrateRigCommand(CLI::App& calibrate) {
   AddCommand(
       calibrate, "rig",
-      "Calibrate cameras that are fixed to each other from a board that they see, and validate "
-      "them; "
-      "exit 1 when a test fails",
+      "Use a board to calibrate cameras fixed to each other, and validate them; exit 1 if a test "
+      "fails",
       "dtr calibrate rig pairs/ --board chessboard:9x6:25mm -o rig.json -o rig.yml",
       [](CLI::App& command) -> Action {
         auto options = std::make_shared<CalibrateRigArguments>();

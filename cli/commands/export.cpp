@@ -319,9 +319,7 @@ void AddWebOptions(CLI::App& command, ExportOptions& options) {
 
 void AddExportCommand(CLI::App& app) {
   AddCommand(
-      app, "export",
-      "Write a set for other programs: a web page, cameras and images, depth maps, clouds, meshes, "
-      "splats",
+      app, "export", "Write a set as a web page, cameras, depth maps, a cloud, a mesh, splats",
       "dtr export scene.dtr --format web -o scene.html", [](CLI::App& command) -> Action {
         auto options = std::make_shared<ExportOptions>();
         command.add_option("SET", options->request.set, "The set")->required();

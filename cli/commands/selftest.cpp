@@ -69,10 +69,8 @@ int RunSelftest(const SelftestArguments& options, const Context& context) {
 
 void AddSelftestCommand(CLI::App& app) {
   AddCommand(
-      app, "selftest",
-      "Stiff and extreme cases of every stage, each with its bound; exit 1 when one "
-      "fails",
-      "dtr selftest --stability -o STABILITY.md", [](CLI::App& command) -> Action {
+      app, "selftest", "Ill-conditioned and extreme cases of every stage; exit 1 when one fails",
+      "dtr selftest --stability -o stability.md", [](CLI::App& command) -> Action {
         auto options = std::make_shared<SelftestArguments>();
         command.add_flag("--stability", options->stability,
                          "Every case (a minute); else the quick ones");

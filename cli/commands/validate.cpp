@@ -127,8 +127,7 @@ int RunValidate(ValidateArguments options, const Context& context) {
 
 void AddValidateCommand(CLI::App& app) {
   AddCommand(
-      app, "validate",
-      "Reprojection tests of a set's or a board's calibration; exit 1 when one fails",
+      app, "validate", "Test the calibration of a set or of a board; exit 1 when a test fails",
       "dtr validate left.json --images held_out/ --report left.html",
       [](CLI::App& command) -> Action {
         auto options = std::make_shared<ValidateArguments>();

@@ -310,7 +310,8 @@ viewer::AppSettings SettingsOf(const Options& options, const DtrSet& set) {
   settings.laps = options.laps;
   settings.largest_divisor = options.largest_divisor;
   settings.screenshot = options.screenshot;
-  const pipeline::NovelCameraRequest& request = options.request;
+  pipeline::NovelCameraRequest request = options.request;
+  request.load_depth = pipeline::DepthLoaderOf(options.set);
   if (request.like.empty() && request.camera_file.empty() && request.path_file.empty() &&
       request.fly_through_frames == 0) {
     return settings;
@@ -324,7 +325,7 @@ viewer::AppSettings SettingsOf(const Options& options, const DtrSet& set) {
 
 /// Views come and go for as long as the window is open: what glibc keeps of the big blocks that
 /// were freed, in as many arenas as there are threads, is memory that others cannot have.
-void ReturnFreedMemory() {
+void LimitKeptMemory() {
 #ifdef __GLIBC__
   constexpr int kBlockBytes = 256 << 10;
   mallopt(M_MMAP_THRESHOLD, kBlockBytes);
@@ -342,7 +343,7 @@ int RunView(const Options& options, const Context& context, PromptEnd& end) {
     throw UsageError("-o " + options.output.string() +
                      ": expected a folder to save into, found none");
   }
-  ReturnFreedMemory();
+  LimitKeptMemory();
   const DtrSet set = io::ReadSet(options.set);
   const std::string warning = io::ValidationWarning(set);
   if (!warning.empty()) context.console.Note(warning);
@@ -378,7 +379,7 @@ void AddViewCommand(CLI::App& app) {
             ->check(CLI::Range(2, 100000))
             ->type_name("N");
         where->require_option(0, 1);
-        command.add_option("--laps", options->laps, "How often to fly along it [1]")
+        command.add_option("--laps", options->laps, "How often to fly along the path [1]")
             ->check(CLI::Range(1, 1'000'000))
             ->type_name("N");
         command

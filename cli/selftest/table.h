@@ -37,8 +37,8 @@ std::vector<std::string> TextLines(const Row& row);
 /// null, and so is `passed` of a row that was skipped.
 std::string ToJson(const std::vector<Row>& rows);
 
-/// The table as docs/STABILITY.md holds it; the same bytes for the same rows. What was skipped
-/// stands in it by name.
+/// Page of a row per case: how many values it has, and the one nearest its bound. The same bytes
+/// for the same rows.
 std::string ToMarkdown(const std::vector<Row>& rows);
 
 }  // namespace dtr::selftest

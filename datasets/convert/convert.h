@@ -10,7 +10,7 @@ namespace dtr::datasets {
 /// plane z, scene units, holes 0) and `out`/masks/*.png, ready for `dtr import` and
 /// `dtr build --poses`. Images are copied byte by byte, except lego's.
 ///
-///   kind         source: what it is, what is converted (docs/CONVENTIONS.md has the table)
+///   kind         source: what it is, what is converted (docs/CONVENTIONS.md has the list)
 ///   fountain     Strecha fountain-P11: .camera files of full-size images; metres
 ///   dtu          DTU scan with cameras_half_par.txt: millimetres become metres
 ///   temple       Middlebury templeSparseRing: par file, pixel centres at integers; metres

@@ -12,7 +12,7 @@
 #include "dtr/base/order_statistics.h"
 #include "dtr/base/progress.h"
 #include "stereo/consistency.h"
-#include "stereo/rounds.h"
+#include "stereo/geometric_passes.h"
 
 namespace dtr::stereo::testing {
 
@@ -112,7 +112,7 @@ inline Score ScoreFirst(const std::vector<StereoView>& views, const DepthEstimat
   return ScoreFirst(views, estimate, truth, [](int, int) { return true; });
 }
 
-/// The first view's depth as a user gets it: search, rounds and both checks, with all other views
+/// The first view's depth as a user gets it: search, passes and both checks, with all other views
 /// as everyone's neighbours.
 inline DepthEstimate WholeRun(const std::vector<StereoView>& views, const DepthRange& range) {
   const auto engine = MakeEngine("patchmatch");
@@ -127,10 +127,10 @@ inline DepthEstimate WholeRun(const std::vector<StereoView>& views, const DepthR
   const Collection collection{views, neighbours, ranges, engine.get(), {}};
   PlaneMapsInMemory planes;
   SilentProgress progress;
-  RunRounds(collection, all, planes, progress);
+  RunAllPasses(collection, all, planes, progress);
   std::vector<DepthEstimate> judged;
   for (const int v : all) {
-    const PlanesAround around(collection, planes, engine->Rounds(), v);
+    const PlanesAround around(collection, planes, engine->Passes(), v);
     if (!around.HasOwn()) {
       const PinholeCamera& camera = views[static_cast<size_t>(v)].camera;
       judged.push_back({DepthImage(camera.width_px(), camera.height_px()),

@@ -3,6 +3,9 @@
 #include <sys/resource.h>
 #include <time.h>
 #include <unistd.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include <algorithm>
 #include <fstream>
@@ -43,6 +46,12 @@ size_t PeakMemoryBytes() { return PeakMemoryBytesOf(RUSAGE_SELF); }
 
 size_t PeakMemoryBytesWithPrograms() {
   return std::max(PeakMemoryBytes(), PeakMemoryBytesOf(RUSAGE_CHILDREN));
+}
+
+void ReturnFreedMemory() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
 }
 
 double MachineMemoryBytes() {

@@ -22,6 +22,10 @@ size_t PeakMemoryBytesWithPrograms();
 /// What this process has just now; 0 where the system does not say.
 size_t MemoryBytes();
 
+/// Returns to the system the memory that was freed but that the allocator still holds; nothing
+/// without glibc.
+void ReturnFreedMemory();
+
 /// Memory that this process may have: the machine's, or less where a limit is set (ulimit -v).
 double MachineMemoryBytes();
 

@@ -12,7 +12,7 @@
 namespace dtr::io {
 namespace {
 
-// Measured with OpenImageIO 2.4 (docs/FUZZING.md); JPEG and JPEG 2000: of each channel.
+// Measured with OpenImageIO 2.4 (docs/SECURITY.md); JPEG and JPEG 2000: of each channel.
 constexpr double kBmpBytes = 2, kGifBytes = 8, kWebpBytes = 16, kHeifBytes = 16, kJpeg2000Bytes = 7,
                  kJpegBytes = 2;
 

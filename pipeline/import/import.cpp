@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <utility>
 
 #include "calib/sparse_from_sfm.h"
 #include "capture/ingest.h"
@@ -48,9 +49,11 @@ capture::FolderContents ContentsFor(const ImportOptions& options, const io::Came
   return contents;
 }
 
-// The folder of the masks, the one that is asked for named in the cameras.
-fs::path FindMasks(const ImportRequest& request, CamerasFromFile& cameras, Progress& progress) {
-  if (request.masks.empty()) return cameras.mask_dir;
+// The cameras with the masks that are asked for, else with those of their file.
+CamerasFromFile WithMasks(CamerasFromFile cameras, const ImportRequest& request,
+                          Progress& progress) {
+  if (request.masks.empty()) return cameras;
+  cameras.mask_dir = request.masks;
   NameMasks(request.masks, request.images, cameras.list);
   const auto bare = std::count_if(cameras.list.cameras.begin(), cameras.list.cameras.end(),
                                   [](const auto& camera) { return camera.mask_file.empty(); });
@@ -58,7 +61,7 @@ fs::path FindMasks(const ImportRequest& request, CamerasFromFile& cameras, Progr
     progress.Note(fmt::format("{} of {} photos have no mask: all of them is used", bare,
                               cameras.list.cameras.size()));
   }
-  return request.masks;
+  return cameras;
 }
 
 // What is asked for, else what the file says.
@@ -105,11 +108,11 @@ void RequireComputable(const std::optional<double>& depth_unit) {
                   *depth_unit, kMinLength, kMaxLength));
 }
 
-// Poses act on p_world - origin afterwards, the points of the model with them.
-void Recentre(CamerasFromFile& cameras) {
+// Poses that act on p_world - origin, the points of the model with them.
+CamerasFromFile Recentred(CamerasFromFile cameras) {
   const Eigen::Vector3d before = cameras.list.world_origin;
   cameras.list = io::RecentreWorld(std::move(cameras.list));
-  if (!cameras.model) return;
+  if (!cameras.model) return cameras;
   std::map<std::string, const Pose*> pose_of;
   for (const io::NamedCamera& named : cameras.list.cameras) {
     pose_of[named.name] = &named.cam_from_world;
@@ -119,11 +122,13 @@ void Recentre(CamerasFromFile& cameras) {
   }
   const Eigen::Vector3d moved = cameras.list.world_origin - before;
   for (auto& [id, point] : cameras.model->points) point.p_in_world -= moved;
+  return cameras;
 }
 
 // The model with points: the file's, tested, or of the photos; adjusted where that is asked for.
 CalibratedPhotos Calibrated(const ImportRequest& request, const ImportOptions& options,
-                            CamerasFromFile& cameras, Progress& progress) {
+                            const CamerasFromFile& cameras, std::optional<calib::SfmModel> model,
+                            Progress& progress) {
   const capture::Capture photos = PhotosOf(cameras.list, options);
   CalibrateOptions calibrate;
   for (const capture::Photo& photo : photos.photos) {
@@ -134,9 +139,8 @@ CalibratedPhotos Calibrated(const ImportRequest& request, const ImportOptions& o
   calibrate.poses = request.cameras;
   calibrate.refine_poses = request.refine;
   const TemporaryFolder workspace;
-  if (cameras.model) {
-    return WithPointsOfFile(std::move(*cameras.model), photos, calibrate, workspace.path(),
-                            progress);
+  if (model) {
+    return WithPointsOfFile(std::move(*model), photos, calibrate, workspace.path(), progress);
   }
   if (!cameras.points_file.empty()) {
     progress.Note(
@@ -146,8 +150,8 @@ CalibratedPhotos Calibrated(const ImportRequest& request, const ImportOptions& o
   return WithPointsOfPhotos(cameras.list, photos, calibrate, workspace.path(), progress);
 }
 
-// Adjusted cameras take the place of the given ones.
-void TakeCameras(const calib::SfmModel& model, io::CameraList& list) {
+// The list with the adjusted cameras of the model.
+io::CameraList WithCamerasOf(const calib::SfmModel& model, io::CameraList list) {
   std::map<std::string, const calib::SfmImage*> image_of;
   for (const calib::SfmImage& image : model.images) image_of[image.name] = &image;
   for (io::NamedCamera& named : list.cameras) {
@@ -155,50 +159,56 @@ void TakeCameras(const calib::SfmModel& model, io::CameraList& list) {
     SetCameraModel(named, model.cameras.at(image.camera_id));
     named.cam_from_world = image.cam_from_world;
   }
+  return list;
 }
 
-// Points of the views; says how many of the file's are of photos that are not here.
-SparseScene PointsOf(const ImportRequest& request, const CamerasFromFile& cameras, bool from_file,
-                     Progress& progress) {
+// Points of the views of `list`.
+SparseScene PointsOf(const calib::SfmModel& model, const io::CameraList& list) {
   std::vector<std::string> names;
   std::vector<PinholeCamera> pinholes;
-  for (const io::NamedCamera& named : cameras.list.cameras) {
+  for (const io::NamedCamera& named : list.cameras) {
     names.push_back(named.name);
     pinholes.push_back(named.camera);
   }
-  SparseScene points = calib::ToSparseScene(*cameras.model, names, pinholes);
-  const size_t all = cameras.model->points.size(), used = points.points.size();
-  if (from_file && used < all) {
+  return calib::ToSparseScene(model, names, pinholes);
+}
+
+/// Cameras as the set gets them, with its points.
+struct CamerasAndPoints {
+  CamerasFromFile cameras;  ///< without their model
+  CalibrationReport report = {};
+  std::optional<SparseScene> points = {};  ///< none: the set has depth
+};
+
+// Points of the file, or of the photos: those of a set without depth. Adjusts the cameras to them
+// where that is asked for.
+CamerasAndPoints FindPoints(const ImportRequest& request, const ImportOptions& options,
+                            CamerasFromFile cameras, Progress& progress) {
+  const bool from_file = cameras.model.has_value();
+  if (!from_file && !request.depth.empty()) return {std::move(cameras)};
+  cameras = Recentred(std::move(cameras));
+  std::optional<calib::SfmModel> model = std::exchange(cameras.model, {});
+  CalibratedPhotos calibrated = Calibrated(request, options, cameras, std::move(model), progress);
+  const auto& adjustment = calibrated.report.bundle_adjustment;
+  const bool adjusted = adjustment && adjustment->refined.changed;
+  if (adjusted) cameras.list = WithCamerasOf(calibrated.model, std::move(cameras.list));
+  SparseScene points = PointsOf(calibrated.model, cameras.list);
+  const size_t all = calibrated.model.points.size(), used = points.points.size();
+  if (from_file && !adjusted && used < all) {
     progress.Note(
         fmt::format("{}: {} of its {} points are not used, fewer than two of the photos see them",
                     request.cameras.string(), all - used, all));
   }
-  return points;
+  return {std::move(cameras), std::move(calibrated.report), std::move(points)};
 }
 
-// Points of the file, or of the photos: those of a set without depth. Adjusts the cameras to them
-// where that is asked for.
-std::optional<SparseScene> FindPoints(const ImportRequest& request, ImportOptions& options,
-                                      CamerasFromFile& cameras, Progress& progress) {
-  const bool from_file = cameras.model.has_value();
-  if (!from_file && !request.depth.empty()) return std::nullopt;
-  Recentre(cameras);
-  CalibratedPhotos calibrated = Calibrated(request, options, cameras, progress);
-  options.calibration = std::move(calibrated.report);
-  cameras.model = std::move(calibrated.model);
-  const auto& adjustment = options.calibration.bundle_adjustment;
-  const bool adjusted = adjustment && adjustment->refined.changed;
-  if (adjusted) TakeCameras(*cameras.model, cameras.list);
-  return PointsOf(request, cameras, from_file && !adjusted, progress);
-}
-
-ImportOptions OptionsFor(const ImportRequest& request, CamerasFromFile& cameras,
+ImportOptions OptionsFor(const ImportRequest& request, const CamerasFromFile& cameras,
                          Progress& progress) {
   ImportOptions options;
   options.images_dir = request.images;
   options.depth_dir = request.depth;
   if (request.depth == cameras.depth_dir) options.confidence = cameras.confidence;
-  options.mask_dir = FindMasks(request, cameras, progress);
+  options.mask_dir = cameras.mask_dir;
   options.depth_kind = request.depth_kind;
   options.depth_unit = DepthUnit(request, cameras, progress);
   RequireComputable(options.depth_unit);
@@ -210,12 +220,16 @@ ImportOptions OptionsFor(const ImportRequest& request, CamerasFromFile& cameras,
   return options;
 }
 
-// Captures have folders of their own; what they have without a depth map is no view of a set with
-// depth.
-void TakeFolders(CamerasFromFile& cameras, ImportRequest& request) {
+// The request with a capture's own folders where it names none.
+ImportRequest WithFolders(ImportRequest request, const CamerasFromFile& cameras) {
   if (request.images.empty()) request.images = cameras.images_dir;
   if (request.depth.empty()) request.depth = cameras.depth_dir;
-  if (cameras.depth_dir.empty() || request.depth != cameras.depth_dir) return;
+  return request;
+}
+
+// The cameras that are views of a set with depth: of a capture, those with a depth map.
+CamerasFromFile WithDepth(CamerasFromFile cameras, const ImportRequest& request) {
+  if (cameras.depth_dir.empty() || request.depth != cameras.depth_dir) return cameras;
   std::erase_if(cameras.list.cameras, [&](const io::NamedCamera& named) {
     if (!named.depth_file.empty()) return false;
     cameras.skipped.emplace_back(named.name, "no depth map");
@@ -224,42 +238,55 @@ void TakeFolders(CamerasFromFile& cameras, ImportRequest& request) {
   if (cameras.list.cameras.empty()) {
     throw Error(request.cameras.string() + ": expected depth maps, found none");
   }
+  return cameras;
+}
+
+void RejectRefiningOfDepth(const ImportRequest& request) {
+  if (!request.refine || request.depth.empty()) return;
+  throw UsageError(
+      "`refine`: depth maps belong to the cameras as they are given; leave out `depth`, or let "
+      "dtr build adjust the cameras (`poses`, `refine`) and take the depth as a prior "
+      "(`depth_prior`)");
+}
+
+// The cameras of the file, with what it says of them reported.
+CamerasFromFile ReadCameras(const ImportRequest& asked, Progress& progress) {
+  if (asked.images.empty() && io::RgbdFormatOf(asked.cameras).empty()) {
+    throw UsageError(fmt::format("`images`: expected the folder of the images of {}, found none",
+                                 asked.cameras.string()));
+  }
+  CamerasFromFile cameras = ReadCameraFile(asked.cameras, asked.format,
+                                           {.images = asked.images,
+                                            .depth = asked.depth,
+                                            .masks = asked.masks,
+                                            .allow_missing = asked.allow_missing});
+  io::RequireComputable(cameras.list, asked.cameras.string());
+  for (const std::string& note : cameras.notes) progress.Note(note);
+  return cameras;
 }
 
 }  // namespace
 
-ImportReport Import(ImportRequest request, Progress& listener) {
+ImportReport Import(const ImportRequest& asked, Progress& listener) {
   RecordedNotes progress(listener);
-  if (request.images.empty() && io::RgbdFormatOf(request.cameras).empty()) {
-    throw UsageError(fmt::format("`images`: expected the folder of the images of {}, found none",
-                                 request.cameras.string()));
-  }
-  CamerasFromFile cameras = ReadCameraFile(request.cameras, request.format,
-                                           {.images = request.images,
-                                            .depth = request.depth,
-                                            .masks = request.masks,
-                                            .allow_missing = request.allow_missing});
-  io::RequireComputable(cameras.list, request.cameras.string());
-  for (const std::string& note : cameras.notes) progress.Note(note);
-  TakeFolders(cameras, request);
-  if (request.refine && !request.depth.empty()) {
-    throw UsageError(
-        "`refine`: depth maps belong to the cameras as they are given; leave out `depth`, or let "
-        "dtr build adjust the cameras (`poses`, `refine`) and take the depth as a prior "
-        "(`depth_prior`)");
-  }
+  CamerasFromFile cameras = ReadCameras(asked, progress);
+  const ImportRequest request = WithFolders(asked, cameras);
+  cameras = WithDepth(std::move(cameras), request);
+  RejectRefiningOfDepth(request);
+  cameras = WithMasks(std::move(cameras), request, progress);
   ImportOptions options = OptionsFor(request, cameras, progress);
   io::SetWriter::RequireTarget(request.output, request.force);
   ImportReport report;
   report.contents = ContentsFor(options, cameras.list);
   listener.Note(capture::LineOf(report.contents));
-  const std::optional<SparseScene> points = FindPoints(request, options, cameras, progress);
-  report.alpha = ImportSet(cameras.list, options, request.output, request.force,
-                           points ? &*points : nullptr, progress);
+  CamerasAndPoints found = FindPoints(request, options, std::move(cameras), progress);
+  options.calibration = std::move(found.report);
+  report.alpha = ImportSet(found.cameras.list, options, request.output, request.force,
+                           found.points ? &*found.points : nullptr, progress);
   report.calibration = std::move(options.calibration);
-  report.views = cameras.list.cameras.size();
+  report.views = found.cameras.list.cameras.size();
   report.held_out = options.held_out.size();
-  report.skipped = std::move(cameras.skipped);
+  report.skipped = std::move(found.cameras.skipped);
   report.notes = progress.lines();
   return report;
 }

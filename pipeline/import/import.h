@@ -49,6 +49,6 @@ struct ImportReport {
 /// UsageError when the output exists (without force) and for `refine` with depth maps, Error for a
 /// file that is absent, damaged or of another size. A failure or an interruption leaves nothing
 /// behind.
-ImportReport Import(ImportRequest request, Progress& progress);
+ImportReport Import(const ImportRequest& request, Progress& progress);
 
 }  // namespace dtr::pipeline

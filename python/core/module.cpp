@@ -33,7 +33,9 @@ using NovelFrame = pipeline::NovelFrame;
 
 /// A set and what draws it.
 struct Set : std::enable_shared_from_this<Set> {
-  explicit Set(const std::filesystem::path& folder) : open(folder), pool(folder, open.set()) {}
+  explicit Set(const std::filesystem::path& set_folder)
+      : folder(set_folder), open(folder), pool(folder, open.set()) {}
+  std::filesystem::path folder;
   OpenSet open;
   RenderPool pool;
 };
@@ -154,8 +156,9 @@ NovelFrame CameraOf(const SetView& view) {
   return {view.view().id, view.view().camera, view.view().cam_from_world};
 }
 
-std::vector<NovelFrame> CamerasOf(const Set& set, const pipeline::NovelCameraRequest& request,
+std::vector<NovelFrame> CamerasOf(const Set& set, pipeline::NovelCameraRequest request,
                                   size_t time_step, py::object note) {
+  request.load_depth = pipeline::DepthLoaderOf(set.folder);
   Caller caller(py::none(), std::move(note));
   std::vector<std::string> notes;
   std::vector<NovelFrame> cameras;

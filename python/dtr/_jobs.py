@@ -80,7 +80,7 @@ def run(
 
     `run("stereo", "scene.dtr", preset="fast")` is `dtr stereo scene.dtr --preset fast`: options have
     their names of the command line with underscores; True and False set and unset flags, None is
-    the default, lists are several values. `dtr COMMAND --help` describes them. The commands of
+    the default, lists are several values. `dtr COMMAND --help-all` describes them. The commands of
     windows and of measurements of the program (`view`, `bench`, `selftest`) are not there.
 
     A command whose checks failed (`validate`) returns all the same, with what it found. Notes and

@@ -11,7 +11,7 @@ namespace {
 
 struct Advised {
   int code;
-  std::string advice;                ///< of the line, and of docs/ERRORS.md
+  std::string advice;                ///< that the line must hold
   std::vector<std::string> refused;  ///< what was asked
   std::function<void()> follow;      ///< what the line says to do, apart from other options
   std::vector<std::string> done;     ///< what is asked then

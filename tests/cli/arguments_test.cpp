@@ -1,6 +1,9 @@
 // Words of the command line that can be meant by nobody, whatever the command.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <sstream>
+
 #include "capture/store.h"
 #include "dtr/base/process.h"
 #include "dtr/base/work_folder.h"
@@ -46,6 +49,48 @@ TEST_F(Arguments, HelpOfACommandIsThatOfItsOption) {
   EXPECT_NE(board.find("--board"), std::string::npos);
   EXPECT_NE(DtrOk({"--help"}).out.find("help"), std::string::npos);
   ExpectRejected(Dtr({"help", "frobnicate"}), kWrongUsage, "no command is called 'frobnicate'");
+}
+
+// Every command in 100 columns and 40 lines; --help-all has what does not fit.
+TEST_F(Arguments, HelpFitsAScreen) {
+  const std::string commands = DtrOk({"--help"}).out;
+  std::vector<std::vector<std::string>> called = {{}};
+  for (const char* name :
+       {"build", "capture", "stereo", "import", "join", "render", "info", "validate", "evaluate",
+        "inspect", "advise", "prune", "export", "bench", "selftest", "batch", "view"}) {
+    if (commands.find("\n  " + std::string(name) + " ") != std::string::npos) {
+      called.push_back({name});
+    }
+  }
+  for (const char* name : {"photos", "board", "rig", "refine", "scale"}) {
+    called.push_back({"calibrate", name});
+  }
+  for (std::vector<std::string> words : called) {
+    SCOPED_TRACE(words.empty() ? "" : words.back());
+    words.insert(words.begin(), "help");
+    const std::string help = DtrOk(words).out;
+    EXPECT_LE(std::count(help.begin(), help.end(), '\n'), 40) << help;
+    std::istringstream lines(help);
+    for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 100u) << line;
+  }
+  EXPECT_EQ(DtrOk({"build", "--help"}).out.find("--passes"), std::string::npos);
+  EXPECT_NE(DtrOk({"build", "--help-all"}).out.find("--passes N"), std::string::npos);
+  EXPECT_EQ(DtrOk({"help", "build", "--all"}).out, DtrOk({"build", "--help-all"}).out);
+  for (const char* command : {"", "calibrate", "dataset"}) {
+    std::vector<std::string> words = {"help", "--all"};
+    if (*command != '\0') words.insert(words.begin() + 1, command);
+    EXPECT_NE(DtrOk(words).out.find("Usage: dtr"), std::string::npos);
+  }
+}
+
+TEST_F(Arguments, APathInThePlaceOfACommand) {
+  ExpectRejected(Dtr({Photos()}), kWrongUsage, " -o NAME.dtr makes a set of its photos");
+  fs::create_directories(In("my photos"));
+  ExpectRejected(Dtr({In("my photos")}), kWrongUsage, "my photos' -o NAME.dtr makes a set");
+  for (const char* end : {"", "/"}) {
+    ExpectRejected(Dtr({Shared("good.dtr") + end}), kWrongUsage, "found the set '");
+  }
+  ExpectRejected(Dtr({Shared("good.dtr/set.json")}), kWrongUsage, "no command is called");
 }
 
 TEST_F(Arguments, NumbersThatAreNone) {

@@ -40,7 +40,7 @@ std::vector<std::string> Build(const fs::path& photos, const fs::path& model, co
           "-o",           set.string(),
           "--poses",      model.string(),
           "--max-size",   "0",
-          "--rounds",     "1",
+          "--passes",     "1",
           "--iterations", "2",
           "--neighbours", "2",
           "--threads",    "2"};
@@ -167,7 +167,7 @@ DepthFound FoundDepth(const View& view, const DepthImage& truth) {
   return {static_cast<double>(both) / known, static_cast<double>(right) / std::max(both, 1)};
 }
 
-// Photos of 0.006 to 0.04 Mpx, one round, two neighbours. Least complete (measured 0.34) is the
+// Photos of 0.006 to 0.04 Mpx, one pass, two neighbours. Least complete (measured 0.34) is the
 // last of the arc, whose neighbours, on one side only, are 2.5 times as coarse; least right (0.84)
 // the first, which has them on one side too. Means measured: 0.60 and 0.91. The maps are
 // deterministic; the margins are for other compilers.

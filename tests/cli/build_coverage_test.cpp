@@ -28,7 +28,7 @@ class BuildCoverage : public ::testing::Test {
 TEST_F(BuildCoverage, IsWhatAdviseFindsAndTheSameForAnyNumberOfThreads) {
   // Three photos in the middle of the arc are held out: there the capture has a gap.
   const std::vector<std::string> quick{
-      "--rounds",     "0", "--iterations", "1",
+      "--passes",     "0", "--iterations", "1",
       "--neighbours", "2", "--holdout",    "0002.jpg,0003.jpg,0004.jpg",
       "--threads"};
   const auto with_threads = [&](const std::string& threads) {

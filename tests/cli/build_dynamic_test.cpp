@@ -44,7 +44,7 @@ class BuildDynamic : public ::testing::Test {
     std::vector<std::string> words{
         "build", At(photos), "--dynamic", "--rig",          At("toys/rig.json"),
         "-o",    At(set),    "--holdout", holdout,          "--preset",
-        "fast",  "--rounds", "1",         "--no-completion"};
+        "fast",  "--passes", "1",         "--no-completion"};
     words.insert(words.end(), more.begin(), more.end());
     return words;
   }

@@ -30,7 +30,7 @@ TEST(BuildWithMasks, WhatAMaskHidesHasNoDepth) {
   const auto build = [&](const std::string& name) {
     const fs::path set = folder / name;
     DtrOk({"build", (folder / "c/images").string(), "-o", set.string(), "--poses",
-           (folder / "c/sparse").string(), "--max-size", "0", "--rounds", "0", "--iterations", "2",
+           (folder / "c/sparse").string(), "--max-size", "0", "--passes", "0", "--iterations", "2",
            "--neighbours", "2"});
     DtrSet read = io::ReadSet(set);
     for (View& view : read.frames.front().views) io::LoadPixels(set, view, {});

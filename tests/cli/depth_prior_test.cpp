@@ -88,7 +88,7 @@ class DepthPrior : public ::testing::Test {
 
 TEST_F(DepthPrior, AddsDepthAndSaysHowItAgrees) {
   const Ran without = Dtr({"stereo", Cameras(), "-o", In("without.dtr"), "--preset", "fast",
-                           "--rounds", "0", "--no-completion", "--json", "-"});
+                           "--passes", "0", "--no-completion", "--json", "-"});
   const Ran with = Stereo(GoodMaps(), "with.dtr");
   ASSERT_EQ(with.code, 0) << with.err;
   const Json json = Json::parse(with.out), prior = json.at("depth_prior");
@@ -161,7 +161,7 @@ TEST_F(DepthPrior, ARejectedPriorLeavesTheCamerasForTheNextCommand) {
                                      In(folder + "/built.dtr"),
                                      "--preset",
                                      "fast",
-                                     "--rounds",
+                                     "--passes",
                                      "0",
                                      "--no-completion"};
     args.insert(args.end(), further.begin(), further.end());

@@ -68,7 +68,7 @@ TEST_F(Killed, ADynamicBuildOfPhotos) {
   const auto build = [&](const std::string& set) {
     return Words{
         "build",     In("toys/photos"), "--dynamic", "--rig", In("toys/rig.json"), "-o", set,
-        "--holdout", "cam02",           "--preset",  "fast",  "--rounds",          "1"};
+        "--holdout", "cam02",           "--preset",  "fast",  "--passes",          "1"};
   };
   KillAndFinish(build, kKills, 6);
 }
@@ -87,7 +87,7 @@ TEST_F(Killed, ADynamicBuildOfVideosThatStoresVideos) {
                  set,
                  "--preset",
                  "fast",
-                 "--rounds",
+                 "--passes",
                  "1",
                  "--no-completion",
                  "--video",

@@ -143,7 +143,7 @@ TEST_F(LeftOut, WhatShowsAHeldOutPhotoAgain) {
 }
 
 TEST_F(LeftOut, FloatsWhere16BitsHold) {
-  Build(WithPoses({"--rounds", "0", "--iterations", "1", "--neighbours", "2"}));
+  Build(WithPoses({"--passes", "0", "--iterations", "1", "--neighbours", "2"}));
   EXPECT_THAT(Log(), Contains("depth in floats left out: 16 bits hold what is known in all 7 "
                               "views"));
   const DtrSet set = io::ReadSet(Set());

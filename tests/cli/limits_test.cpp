@@ -29,11 +29,11 @@ class Limits : public CourtyardAndSet {
             "96",
             "--neighbours",
             "2",
-            "--round-neighbours",
+            "--pass-neighbours",
             "2",
             "--iterations",
             "1",
-            "--rounds",
+            "--passes",
             "1",
             "--threads",
             "8"};

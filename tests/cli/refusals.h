@@ -22,7 +22,7 @@ using Json = nlohmann::json;
 
 struct Rejection {
   int code;
-  std::string words;  // of the line, and of the page
+  std::string words;  // that the line must hold
   std::vector<std::string> args;
 };
 

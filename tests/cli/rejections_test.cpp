@@ -1,5 +1,5 @@
-// Requests that need no set-up of their own to be rejected: each in one line that docs/ERRORS.md
-// lists, with the right exit code.
+// Requests that need no set-up of their own to be rejected: each in one line, with the right exit
+// code.
 #include "dtr/io/image_io.h"
 #include "tests/capture/photo_files.h"
 #include "tests/cli/refusals.h"

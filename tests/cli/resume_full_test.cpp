@@ -17,7 +17,7 @@ TEST_F(ResumingLong, TwentyRandomKills) {
 }
 
 // So little at a time that every stage is stopped in the middle. Depth maps take the place of what
-// the rounds before them needed: there the disk is filled on the way.
+// the passes before them needed: there the disk is filled on the way.
 TEST_F(ResumingLong, FullDiskAtEveryStage) {
   GrowUntilFinished(24, 10);
   FillAt("depth");

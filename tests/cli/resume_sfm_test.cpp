@@ -28,7 +28,7 @@ constexpr int kKills = 10;
 constexpr double kMaxShift = 0.01;  // of the median distance to the next camera
 
 std::vector<std::string> Build(const fs::path& photos, const fs::path& set) {
-  return {"build", photos.string(), "-o", set.string(), "--max-size", "96", "--rounds",
+  return {"build", photos.string(), "-o", set.string(), "--max-size", "96", "--passes",
           "1",     "--iterations",  "1",  "--threads",  "1"};
 }
 

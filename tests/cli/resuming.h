@@ -57,7 +57,7 @@ class Resuming : public ::testing::Test {
     // As little work as every stage can be made of: many runs are made.
     for (const char* word :
          {"--holdout", "every:4", "--depth-error", "0.25", "--max-size", "96", "--neighbours", "2",
-          "--round-neighbours", "2", "--iterations", "1", "--rounds", "1", "--threads", "1"}) {
+          "--pass-neighbours", "2", "--iterations", "1", "--passes", "1", "--threads", "1"}) {
       arguments.emplace_back(word);
     }
     arguments.insert(arguments.end(), {"-o", set.string()});

@@ -46,7 +46,7 @@ bool IsDone(const Ran& ran);
 Ran DtrCalibrated(const std::vector<std::string>& args);
 
 /// Expects a rejection: this exit code, one line that begins with "dtr: ", the last one on stderr,
-/// with `text` in it. docs/ERRORS.md must list the text, so that the page stays true.
+/// with `text` in it.
 void ExpectRejected(const Ran& ran, int code, const std::string& text);
 
 /// Bytes of every file below `folder` by relative path; report/run.json, which holds times and is

@@ -123,7 +123,7 @@ TEST(Slurm, JobsOfWhichOneIsKilledGiveTheBytesOfABuildInTheEnd) {
   const auto words = [&](const char* command, const fs::path& set) {
     return std::vector<std::string>{command,    (folder / "courtyard/images").string(),
                                     "--poses",  (folder / "courtyard/cameras.json").string(),
-                                    "--rounds", "1",
+                                    "--passes", "1",
                                     "--memory", "0.8",
                                     "-o",       set.string()};
   };

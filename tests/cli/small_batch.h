@@ -34,11 +34,11 @@ class Batch : public ::testing::Test {
                                       "every:4",
                                       "--neighbours",
                                       "2",
-                                      "--round-neighbours",
+                                      "--pass-neighbours",
                                       "2",
                                       "--iterations",
                                       "1",
-                                      "--rounds",
+                                      "--passes",
                                       "1",
                                       "-o",
                                       Set(run).string()};

@@ -38,7 +38,7 @@ inline const WritingCommand kWritingCommands[] = {
               "OF/courtyard/depth -o IN/set.dtr"},
     {.name = "join", .words = "join OF/good.dtr OF/good.dtr -o IN/moving.dtr"},
     {.name = "stereo",
-     .words = "stereo IN/set.dtr --neighbours 2 --round-neighbours 2 --iterations 1 --rounds 1",
+     .words = "stereo IN/set.dtr --neighbours 2 --pass-neighbours 2 --iterations 1 --passes 1",
      .replaces = "cameras.dtr"},
     {.name = "scale",
      .words = "calibrate scale IN/set.dtr --distance 0000,0006=2m",

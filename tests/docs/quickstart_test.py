@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = """#!/bin/sh
 echo "$@" >>"$CALLS"
 case "$1" in
-build) mkdir -p "$4" && touch "$4/set.json"; case "$*" in *--holdout*) echo 0003.jpg >"$4/held";; esac;;
+build) [ -z "$FAIL" ] || { echo "dtr: too dark"; exit 1; }; mkdir -p "$4" && touch "$4/set.json"; case "$*" in *--holdout*) echo 0003.jpg >"$4/held";; esac;;
 info) [ ! -f "$2/held" ] || cat "$2/held";;
 evaluate) echo "a table";;
 esac
@@ -39,12 +39,12 @@ class QuickstartTest(unittest.TestCase):
         path.write_text(text)
         path.chmod(0o755)
 
-    def run_it(self, *arguments):
+    def run_it(self, *arguments, code=0, fail=""):
         calls = self.root / "calls"
-        environment = dict(os.environ, CALLS=str(calls), PATH=f"{self.root / 'bin'}:{os.environ['PATH']}")
+        environment = dict(os.environ, CALLS=str(calls), FAIL=fail, PATH=f"{self.root / 'bin'}:{os.environ['PATH']}")
         ran = subprocess.run([self.root / "quickstart", *arguments], env=environment, capture_output=True, text=True)
-        self.assertEqual(ran.returncode, 0, ran.stderr)
-        return ran.stdout, calls.read_text().splitlines()
+        self.assertEqual(ran.returncode, code, ran.stderr)
+        return (ran.stderr if code else ran.stdout), calls.read_text().splitlines()
 
     def test_of_the_sample_photos_some_are_held_out(self):
         _, calls = self.run_it()
@@ -57,6 +57,19 @@ class QuickstartTest(unittest.TestCase):
         self.assertFalse(any("holdout" in call or "--like" in call for call in calls))
         self.assertTrue(any(call.startswith("evaluate") and "--leave-one-out" in call for call in calls))
         self.assertIn("no photo is held out", out)
+
+    def test_it_says_what_it_does_in_six_steps_and_ends_with_view_and_page(self):
+        out, calls = self.run_it()
+        self.assertEqual([line[:3] for line in out.splitlines() if line[1:3] == "/6"], [f"{i}/6" for i in range(1, 7)])
+        self.assertLess(len(out.splitlines()), 30)
+        self.assertRegex(calls[-1], r"^export .*plaza.dtr --format web -o .*plaza.html --force$")
+        self.assertRegex(out, r"dtr view .*plaza.dtr")
+
+    def test_a_step_that_fails_shows_the_end_of_the_log(self):
+        error, calls = self.run_it(code=1, fail="build")
+        self.assertIn("dtr: too dark", error)
+        self.assertRegex(error, r"quickstart: failed \(exit code 1\): .*dtr build .*; the whole log: .*/out/quickstart.log")
+        self.assertEqual(len(calls), 1)
 
 
 if __name__ == "__main__":

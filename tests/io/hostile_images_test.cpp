@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 constexpr double kMiB = 1 << 20;
-// docs/FUZZING.md, with OpenImageIO's conversion buffer.
+// docs/SECURITY.md, with OpenImageIO's conversion buffer.
 constexpr double kTimesInput = 10, kBeside = 128 * kMiB;
 
 struct Taken {

@@ -118,7 +118,7 @@ LensCamera WrongLens(LensCamera lens) {
   return lens;
 }
 
-// For docs/CALIBRATION.md.
+// For docs/accuracy/CALIBRATION.md.
 void Tell(const char* what, const SfmModel& model, const Held& held, const Bundle& truth) {
   std::printf(
       "%s: cameras off the truth, RMS: %.3f m as a whole, %.3f m refined and as a whole, %.3f m "

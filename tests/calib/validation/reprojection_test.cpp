@@ -349,7 +349,7 @@ TEST(Validate, JsonSurvivesHostileNames) {
   }
 }
 
-/// One line per validation result: docs/VALIDATION.md's tables are made of them.
+/// One line per validation result: docs/accuracy/CALIBRATION.md's tables are made of them.
 bool PassesTold(const char* what, const ValidationReport& report) {
   std::cout << "  " << what;
   for (const Check& c : report.tests) std::cout << "  " << c.name << " " << c.value;
