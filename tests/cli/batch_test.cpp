@@ -38,7 +38,7 @@ TEST_F(Batch, CamerasWithTheirPointsNeedNoStagesOfStructureFromMotion) {
   DtrOk(words("build", "plain", {}));
   DtrOk(words("build", "batch", {"--stage", "capture"}));
   EXPECT_FALSE(fs::exists(Set("batch"))) << "one stage is no build";
-  const Ran ran = DtrByItself(words("batch", "batch", {"--local", "2", "--array-size", "2"}));
+  const Ran ran = DtrByItself(words("batch", "batch", {"--local", "2", "--array-size", "1"}));
   ASSERT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(DifferingFiles(Contents(Set("plain")), Contents(Set("batch"))), ::testing::IsEmpty());
 }
@@ -56,7 +56,7 @@ TEST_F(Batch, ForcedTheNewSetTakesThePlaceOfTheOld) {
   ImportSmallCourtyard(folder_ / "courtyard", Set("a"));
   ExpectRejected(RunBatch("a", {"--local", "1", "--array-size", "2"}), 2,
                  "choose another name or pass --force to replace it");
-  const Ran ran = RunBatch("a", {"--force", "--local", "2", "--array-size", "2"});
+  const Ran ran = RunBatch("a", {"--force", "--local", "2", "--array-size", "1"});
   ASSERT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(DifferingFiles(Undisturbed(), Contents(Set("a"))), ::testing::IsEmpty());
 }

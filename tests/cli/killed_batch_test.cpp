@@ -17,6 +17,8 @@ namespace fs = std::filesystem;
 using std::chrono::steady_clock;
 using ::testing::IsEmpty;
 
+constexpr char kParts[] = "3";
+
 // Processes whose command line has a word of this set in it, without this one.
 std::vector<pid_t> ProcessesOf(const fs::path& set) {
   std::vector<pid_t> found;
@@ -44,7 +46,7 @@ bool Within(std::chrono::seconds limit, const std::function<bool()>& holds) {
 // Workers end with it, however it ends, and what they had finished stays.
 TEST_F(BatchFolder, KilledAtAnyMomentItGoesOnToTheSameBytes) {
   const auto begin = steady_clock::now();
-  ASSERT_EQ(Begin().code, 0);
+  ASSERT_EQ(Begin({}, kParts).code, 0);
   const std::chrono::duration<double> whole = steady_clock::now() - begin;
   fs::remove_all(folder_ / "a");
   const auto expected = Undisturbed();
@@ -56,7 +58,7 @@ TEST_F(BatchFolder, KilledAtAnyMomentItGoesOnToTheSameBytes) {
     const Interruption interruption{SIGKILL, [&] { return steady_clock::now() - start >= after; }};
     const Ran ran = fs::exists(Record())
                         ? DtrByItself({"batch", "resume", Set("a").string()}, interruption)
-                        : Begin(interruption);
+                        : Begin(interruption, kParts);
     EXPECT_TRUE(Within(std::chrono::seconds(10), [&] { return ProcessesOf(Set("a")).empty(); }))
         << "workers go on";
     if (ran.signal == SIGKILL) {
@@ -67,7 +69,7 @@ TEST_F(BatchFolder, KilledAtAnyMomentItGoesOnToTheSameBytes) {
     EXPECT_THAT(DifferingFiles(expected, Contents(Set("a"))), IsEmpty());
     fs::remove_all(folder_ / "a");
   }
-  const Ran ran = fs::exists(Record()) ? Resume() : Begin();
+  const Ran ran = fs::exists(Record()) ? Resume() : Begin({}, kParts);
   ASSERT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(DifferingFiles(expected, Contents(Set("a"))), IsEmpty());
   for (const auto& entry : fs::directory_iterator(folder_ / "a")) {

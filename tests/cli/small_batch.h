@@ -78,8 +78,8 @@ class BatchFolder : public Batch {
   std::filesystem::path Done(const std::string& part) const {
     return Set("a").string() + ".partial/work/parts/" + part + ".done.json";
   }
-  Ran Begin(const Interruption& interruption = {}) const {
-    return RunBatch("a", {"--local", "2", "--array-size", "3"}, interruption);
+  Ran Begin(const Interruption& interruption = {}, const std::string& parts = "1") const {
+    return RunBatch("a", {"--local", "2", "--array-size", parts}, interruption);
   }
   Ran Resume() const { return DtrByItself({"batch", "resume", Set("a").string()}); }
   // Begins it, and ends it once something is there to go on with.

@@ -2,7 +2,9 @@
 #pragma once
 #include <signal.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -78,21 +80,43 @@ class ViewerProgram {
     return state;
   }
 
-  /// Waits for its end; the exit code, or -1 where a signal ended it or it never came.
-  int WaitForEnd() {
+  struct End {
+    int code = -1;     // -1 where a signal ended it or it never came
+    double cpu_s = 0;  // of all threads: from the signal on, or in all
+  };
+  End EndBy(int signal) {
+    const double before_s = CpuSeconds();
+    kill(child_, signal);
+    End end = Wait();
+    end.cpu_s -= before_s;
+    return end;
+  }
+  int WaitForEnd() { return Wait().code; }
+
+ private:
+  End Wait() {
     const auto start = std::chrono::steady_clock::now();
     int status = 0;
-    while (waitpid(child_, &status, WNOHANG) == 0) {
-      if (std::chrono::steady_clock::now() - start > kPatience) return -1;
+    rusage used{};
+    while (wait4(child_, &status, WNOHANG, &used) == 0) {
+      if (std::chrono::steady_clock::now() - start > kPatience) return {};
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
     child_ = -1;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    const auto seconds = [](const timeval& t) {
+      return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+    };
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1,
+            seconds(used.ru_utime) + seconds(used.ru_stime)};
+  }
+  // Of all its threads until now.
+  double CpuSeconds() const {
+    clockid_t clock{};
+    timespec time{};
+    if (clock_getcpuclockid(child_, &clock) != 0 || clock_gettime(clock, &time) != 0) return 0;
+    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
   }
 
-  pid_t pid() const { return child_; }
-
- private:
   static constexpr std::chrono::seconds kPatience{120};  // of a loaded machine with sanitizers
   std::filesystem::path state_file_;
   pid_t child_ = -1;
