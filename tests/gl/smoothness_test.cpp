@@ -2,9 +2,10 @@
 //
 // The measure: along FlyThrough's path of 100 steps, the change of a frame is the largest change of
 // any pixel (of 255, of three channels) from the frame before; pixels within 2 of a depth break
-// (SPEC 2.3) in either frame, or unseen in either, are not evaluated. The largest change may be 3
-// times the median of all frames: texture that moves changes pixels, a view that pops changes them
-// all at once.
+// (SPEC 2.3) in either frame, or unseen in either, are not evaluated; nor are those within 2 of the
+// image's border, since breaks beyond it are not known. The largest change may be 3 times the
+// median of all frames: texture that moves changes pixels, a view that pops changes them all at
+// once.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +22,7 @@ namespace {
 
 using namespace dtr::testing;
 
-constexpr int kSteps = 100;
+constexpr int kSteps = 100, kBorderPx = 2;
 constexpr double kLargestOfMedian = 3;
 
 struct Smoothness {
@@ -44,8 +45,8 @@ Smoothness MeasureSmoothness(const RenderScene& views, const std::vector<NovelCa
     Mask breaks = NearBreaks(frame, rule);
     int largest = 0;
     long long judged = 0;
-    for (int y = 0; f > 0 && y < breaks.height(); ++y) {
-      for (int x = 0; x < breaks.width(); ++x) {
+    for (int y = kBorderPx; f > 0 && y < breaks.height() - kBorderPx; ++y) {
+      for (int x = kBorderPx; x < breaks.width() - kBorderPx; ++x) {
         if (breaks(x, y) != 0 || last_breaks(x, y) != 0) continue;
         if (frame.coverage(x, y) == 0 || last.coverage(x, y) == 0) continue;
         largest = std::max(largest, PixelDifference(frame.image, last.image, x, y));
