@@ -23,11 +23,11 @@
 namespace dtr::viewer {
 namespace {
 
-constexpr int kSheetColumns = 5, kSheetCellPx = 180, kMapCells = 420;
+constexpr int kThumbnailPx = 220, kMapCells = 420;
 constexpr int kSmallPx = 240;  // long side of a view that is rendered without its photo
 constexpr size_t kWorstViews = 5;
 constexpr int kNamedShares = 4;  // contributors that are named
-constexpr size_t kSheetViews = 100;
+constexpr size_t kMaxThumbnails = 100;
 
 /// What was found about one source view.
 struct ViewFindings {
@@ -42,7 +42,7 @@ struct ViewFindings {
 
 struct Findings {
   std::vector<ViewFindings> views;
-  std::vector<ImageRgb8> photos, depths, sigmas;  ///< thumbnails
+  std::vector<report::Picture> photos, depths, sigmas;  ///< thumbnails
   ImageRgb8 coverage;
   Ground ground;
 };
@@ -85,8 +85,10 @@ void RenderWithoutItself(const View& view, const View& loaded, ViewStream& strea
   findings.psnr_db = eval::Psnr(result.image, findings.photo, mask);
   findings.coverage = result.coverage_share;
   const NovelCamera camera{small, view.cam_from_world};
-  findings.weights = FalseColour(Shown::kWeights, {result, scene, camera, options, colours},
-                                 [](const View&) { return nullptr; });
+  findings.weights =
+      FalseColour(Shown::kWeights, {result, scene, camera, options, colours}, [](const View&) {
+        return nullptr;
+      }).image;
   const cpu::Contributions found =
       cpu::ContributionsTo(result.depth, scene, small, view.cam_from_world, options);
   for (size_t i = 0; i < found.views.size(); ++i) {
@@ -96,6 +98,28 @@ void RenderWithoutItself(const View& view, const View& loaded, ViewStream& strea
         sum / static_cast<double>(found.shares[i].data().size());
   }
   findings.rendered = result.image;
+}
+
+std::string RangeText(const std::optional<report::ColorScale>& scale) {
+  if (!scale) return "none";
+  return fmt::format("{:.3g} to {:.3g}", std::min(scale->dark, scale->bright),
+                     std::max(scale->dark, scale->bright));
+}
+
+void AddThumbnails(const View& loaded, Findings& findings) {
+  const auto add = [&](std::vector<report::Picture>& to, const ImageRgb8& image,
+                       const std::string& further) {
+    to.push_back({report::Shrink(image, kThumbnailPx), loaded.name + further});
+  };
+  add(findings.photos, loaded.image, "");
+  if (!loaded.depth.empty()) {
+    add(findings.depths, report::ColorizeDepth(loaded.depth),
+        ": " + RangeText(report::ScaleOfDepth(loaded.depth)));
+  }
+  if (loaded.inverse_depth_sigma) {
+    add(findings.sigmas, report::ColorizeSigma(*loaded.inverse_depth_sigma),
+        ": " + RangeText(report::ScaleOfSigma(*loaded.inverse_depth_sigma)));
+  }
 }
 
 Findings FindOut(const DtrSet& set, ViewStream& stream, const InspectFacts& facts,
@@ -114,15 +138,8 @@ Findings FindOut(const DtrSet& set, ViewStream& stream, const InspectFacts& fact
     found.depth_share = DepthShare(loaded.depth);
     found.sigma_px = MedianSigmaPx(loaded);
     coverage.Add(loaded);
-    if (findings.photos.size() < kSheetViews) {
-      findings.photos.push_back(report::Shrink(loaded.image, kSheetCellPx));
-      findings.depths.push_back(
-          loaded.depth.empty() ? ImageRgb8()
-                               : report::Shrink(report::ColorizeDepth(loaded.depth), kSheetCellPx));
-      findings.sigmas.push_back(
-          loaded.inverse_depth_sigma
-              ? report::Shrink(report::ColorizeSigma(*loaded.inverse_depth_sigma), kSheetCellPx)
-              : ImageRgb8());
+    if (findings.photos.size() < kMaxThumbnails) {
+      AddThumbnails(loaded, findings);
     }
     if (views.size() > 1) {
       RenderWithoutItself(*view, loaded, stream, options, colours, found);
@@ -138,28 +155,32 @@ Findings FindOut(const DtrSet& set, ViewStream& stream, const InspectFacts& fact
 std::string PercentText(double share) { return fmt::format("{:.1f} %", 100 * share); }
 
 void AddValidation(report::HtmlReport& page, const InspectFacts& facts) {
-  page.Section("Can the calibration be trusted?");
+  page.Section("Validation of the calibration");
   if (facts.checks.empty()) {
-    page.Result(false, "This set was never validated: run dtr validate");
+    page.Result(false, "not validated: run dtr validate");
     return;
   }
-  const bool good = AllPassed(facts.checks);
-  page.Result(good, good ? "The calibration passed its checks"
-                         : "The calibration broke at least one check");
+  page.Result(AllPassed(facts.checks), report::ValidationResult(facts.checks));
   report::AddChecks(page, facts.checks);
 }
 
-void AddSheets(report::HtmlReport& page, const Findings& findings) {
+void AddGalleries(report::HtmlReport& page, const Findings& findings, LengthUnit unit) {
   page.Section("Photos, depth, uncertainty");
+  if (findings.views.size() > kMaxThumbnails) {
+    page.Paragraph(fmt::format("The first {} in the order of the views' ids.", kMaxThumbnails));
+  }
+  page.Gallery(findings.photos);
+  const char* length = unit == LengthUnit::kMetre ? "metres" : "scene units";
   page.Paragraph(fmt::format(
-      "In the order of the views' ids{}. Depth: closer is brighter, green is "
-      "a hole. Uncertainty of inverse depth: dark is certain.",
-      findings.views.size() > kSheetViews ? fmt::format(", the first {}", kSheetViews) : ""));
-  page.Image("photos", report::ContactSheet(findings.photos, kSheetColumns, kSheetCellPx));
-  page.Image("depth", report::ContactSheet(findings.depths, kSheetColumns, kSheetCellPx));
-  const bool any = std::any_of(findings.sigmas.begin(), findings.sigmas.end(),
-                               [](const ImageRgb8& sigma) { return !sigma.empty(); });
-  if (any) page.Image("sigma", report::ContactSheet(findings.sigmas, kSheetColumns, kSheetCellPx));
+      "Depth, {}: closer is brighter, green is a hole. The numbers are the ends of each palette, "
+      "1 % and 99 % of the pixels.",
+      length));
+  page.Gallery(findings.depths);
+  if (findings.sigmas.empty()) return;
+  page.Paragraph(fmt::format(
+      "Standard deviation of inverse depth, 1 over {}: dark is certain, green is not known.",
+      length));
+  page.Gallery(findings.sigmas);
 }
 
 void AddMaps(report::HtmlReport& page, const DtrSet& set, const Findings& findings,
@@ -294,7 +315,7 @@ std::string InspectPage(const DtrSet& set, ViewStream& stream, const InspectFact
   page.Paragraph(fmt::format("{} source views; lengths in {}.", findings.views.size(),
                              set.unit == LengthUnit::kMetre ? "metres" : "scene units"));
   AddValidation(page, facts);
-  AddSheets(page, findings);
+  AddGalleries(page, findings, set.unit);
   AddMaps(page, set, findings, facts);
   AddWorstViews(page, findings, facts);
   AddContributions(page, set, findings);

@@ -53,25 +53,50 @@ const Table& TableOf(Palette palette) {
   return palette == Palette::kGrey ? kGrey : kColor;
 }
 
-/// Values at the 1 % and 99 % percentiles.
-std::pair<double, double> Range(std::vector<double>& values) {
-  if (values.empty()) return {0, 1};
+/// Values at the 1 % and 99 % percentiles; none of no values.
+std::optional<ColorScale> Percentiles(std::vector<double>& values) {
+  if (values.empty()) return std::nullopt;
   const auto at = [&](double share) {
     const auto position = std::lround(share * static_cast<double>(values.size() - 1));
     std::nth_element(values.begin(), values.begin() + position, values.end());
     return values[static_cast<size_t>(position)];
   };
   const double low = at(0.01), high = at(0.99);
-  return {low, high};
+  return ColorScale{low, high};
 }
 
-/// Paints `value(i)` between low and high; empty values are holes.
+/// Of inverse depth.
+std::optional<ColorScale> InverseScale(const DepthImage& depth, const DepthColors& colors) {
+  std::vector<double> inverse;
+  inverse.reserve(depth.grid().data().size());
+  for (const float value : depth.grid().data()) {
+    if (!DepthImage::IsHole(value)) inverse.push_back(1.0 / value);
+  }
+  auto scale = Percentiles(inverse);
+  if (!scale) return scale;
+  if (colors.far_z && *colors.far_z > 0) scale->dark = 1 / *colors.far_z;
+  if (colors.near_z && *colors.near_z > 0) scale->bright = 1 / *colors.near_z;
+  return scale;
+}
+
+bool IsUsable(float sigma) { return sigma > 0 && std::isfinite(sigma); }
+
+std::optional<ColorScale> LogScale(const Grid<float>& sigma) {
+  std::vector<double> logs;
+  for (const float s : sigma.data()) {
+    if (IsUsable(s)) logs.push_back(std::log(s));
+  }
+  return Percentiles(logs);
+}
+
+/// Paints `value(i)` on the scale; empty values are holes.
 template <typename Value>
-ImageRgb8 Paint(int width, int height, Palette palette, double low, double high,
+ImageRgb8 Paint(int width, int height, Palette palette, const std::optional<ColorScale>& scale,
                 const Value& value) {
   ImageRgb8 image(width, height, 3);
   const Table& table = TableOf(palette);
   // A map of one value is shown bright rather than divided by zero.
+  const double low = scale ? scale->dark : 0, high = scale ? scale->bright : 0;
   const double factor = high > low ? 1 / (high - low) : 0;
   for (size_t i = 0; i < static_cast<size_t>(width) * static_cast<size_t>(height); ++i) {
     const std::optional<double> v = value(i);
@@ -93,18 +118,22 @@ std::array<std::uint8_t, 3> PaletteColor(Palette palette, double value) {
   return TableOf(palette)[static_cast<size_t>(std::lround(t * (kSteps - 1)))];
 }
 
+std::optional<ColorScale> ScaleOfDepth(const DepthImage& depth, const DepthColors& colors) {
+  const auto inverse = InverseScale(depth, colors);
+  if (!inverse) return std::nullopt;
+  return ColorScale{1 / inverse->dark, 1 / inverse->bright};
+}
+
+std::optional<ColorScale> ScaleOfSigma(const Grid<float>& sigma) {
+  const auto logs = LogScale(sigma);
+  if (!logs) return std::nullopt;
+  return ColorScale{std::exp(logs->dark), std::exp(logs->bright)};
+}
+
 ImageRgb8 ColorizeDepth(const DepthImage& depth, const DepthColors& colors) {
   if (depth.empty()) return {};
   const std::vector<float>& z = depth.grid().data();
-  std::vector<double> inverse;
-  inverse.reserve(z.size());
-  for (const float value : z) {
-    if (!DepthImage::IsHole(value)) inverse.push_back(1.0 / value);
-  }
-  auto [low, high] = Range(inverse);
-  if (colors.far_z && *colors.far_z > 0) low = 1 / *colors.far_z;
-  if (colors.near_z && *colors.near_z > 0) high = 1 / *colors.near_z;
-  return Paint(depth.width(), depth.height(), colors.palette, low, high,
+  return Paint(depth.width(), depth.height(), colors.palette, InverseScale(depth, colors),
                [&](size_t i) -> std::optional<double> {
                  if (DepthImage::IsHole(z[i])) return std::nullopt;
                  return 1.0 / z[i];
@@ -113,15 +142,9 @@ ImageRgb8 ColorizeDepth(const DepthImage& depth, const DepthColors& colors) {
 
 ImageRgb8 ColorizeSigma(const Grid<float>& sigma, Palette palette) {
   if (sigma.empty()) return {};
-  const auto usable = [](float s) { return s > 0 && std::isfinite(s); };
-  std::vector<double> logs;
-  for (const float s : sigma.data()) {
-    if (usable(s)) logs.push_back(std::log(s));
-  }
-  const auto [low, high] = Range(logs);
-  return Paint(sigma.width(), sigma.height(), palette, low, high,
+  return Paint(sigma.width(), sigma.height(), palette, LogScale(sigma),
                [&](size_t i) -> std::optional<double> {
-                 if (!usable(sigma.data()[i])) return std::nullopt;
+                 if (!IsUsable(sigma.data()[i])) return std::nullopt;
                  return std::log(sigma.data()[i]);
                });
 }

@@ -28,6 +28,15 @@ struct DepthColors {
 /// 96 in CIELAB, so equal steps look equal (CIE 15:2004); 8-bit sRGB.
 std::array<std::uint8_t, 3> PaletteColor(Palette palette, double value);
 
+/// Values at the ends of a palette; beyond them colours stay the same.
+struct ColorScale {
+  double dark = 0, bright = 0;
+};
+/// Depths, scene units, that ColorizeDepth shows darkest and brightest; none of holes alone.
+std::optional<ColorScale> ScaleOfDepth(const DepthImage& depth, const DepthColors& colors = {});
+/// The same of ColorizeSigma.
+std::optional<ColorScale> ScaleOfSigma(const Grid<float>& sigma);
+
 /// Depth in false colour, linear in inverse depth as disparity is.
 ImageRgb8 ColorizeDepth(const DepthImage& depth, const DepthColors& colors = {});
 

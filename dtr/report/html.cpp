@@ -42,6 +42,8 @@ figure img.plot { background: #fff; padding: .5rem; border: 1px solid var(--line
 figure.plot svg { display: block; width: 100%; height: auto; border: 1px solid var(--line);
   border-radius: .4rem; }
 figcaption { color: var(--soft); font-size: .9rem; margin-top: .35rem; overflow-wrap: break-word; }
+.gallery { display: flex; flex-wrap: wrap; gap: .8rem; align-items: end; }
+.gallery figure { margin: 0; max-width: 100%; break-inside: avoid; }
 @media print { body { background: #fff; color: #000; max-width: none; } }
 )css";
 
@@ -124,6 +126,14 @@ void HtmlReport::Table(const std::vector<std::string>& header,
 void HtmlReport::Image(std::string_view caption, const ImageRgb8& image) {
   body_ += "<figure>" + ImageElement(image, caption) + "<figcaption>" + EscapeHtml(caption) +
            "</figcaption></figure>\n";
+}
+
+void HtmlReport::Gallery(const std::vector<Picture>& pictures) {
+  body_ += "<div class=\"gallery\">\n";
+  for (const Picture& picture : pictures) {
+    if (!picture.image.empty()) Image(picture.description, picture.image);
+  }
+  body_ += "</div>\n";
 }
 
 void HtmlReport::Svg(std::string_view caption, std::string_view svg) {

@@ -9,11 +9,12 @@
 
 namespace dtr::report {
 
-/// A table cell: text, or an image with a description for those who cannot see it.
+/// An image with a description: its caption, or for those who cannot see it.
 struct Picture {
   ImageRgb8 image;
   std::string description;
 };
+/// A table cell.
 using Cell = std::variant<std::string, Picture>;
 
 /// Builds a page from top to bottom. All text is escaped; images are inlined as JPEG, plots as
@@ -30,6 +31,8 @@ class HtmlReport {
   /// Throws std::invalid_argument when a row has not the header's number of cells.
   void Table(const std::vector<std::string>& header, const std::vector<std::vector<Cell>>& rows);
   void Image(std::string_view caption, const ImageRgb8& image);
+  /// Small images in rows, each over its description; empty ones are left out.
+  void Gallery(const std::vector<Picture>& pictures);
   /// `svg`: a whole SVG document.
   void Svg(std::string_view caption, std::string_view svg);
   /// `svg`: what ScatterSvg gives. It becomes part of the page, so that its points tell what they

@@ -70,6 +70,14 @@ void AddViews(HtmlReport& page, const std::vector<View>& views, const SetReportI
 
 }  // namespace
 
+std::string ValidationResult(const std::vector<Check>& checks) {
+  if (AllPassed(checks)) return fmt::format("validation {}", ResultWord(true));
+  const auto failed =
+      std::count_if(checks.begin(), checks.end(), [](const Check& check) { return !check.passed; });
+  return fmt::format("validation {}: {} of {} tests are beyond their limits", ResultWord(false),
+                     failed, checks.size());
+}
+
 void AddChecks(HtmlReport& page, const std::vector<Check>& checks) {
   std::vector<std::vector<Cell>> rows;
   const auto number = [](double v) { return std::isfinite(v) ? fmt::format("{:.4g}", v) : "-"; };
@@ -83,12 +91,7 @@ void AddChecks(HtmlReport& page, const std::vector<Check>& checks) {
 
 void AddSetSections(HtmlReport& page, const DtrSet& set, const SetReportInfo& info) {
   if (!info.checks.empty()) {
-    const bool good = AllPassed(info.checks);
-    const auto failed = std::count_if(info.checks.begin(), info.checks.end(),
-                                      [](const Check& check) { return !check.passed; });
-    page.Result(good, good ? fmt::format("validation {}", ResultWord(true))
-                           : fmt::format("validation {}: {} of {} tests are beyond their limits",
-                                         ResultWord(false), failed, info.checks.size()));
+    page.Result(AllPassed(info.checks), ValidationResult(info.checks));
   }
   std::vector<std::vector<Cell>> facts;
   for (const auto& [name, value] : info.facts) facts.push_back({name, value});
@@ -99,7 +102,7 @@ void AddSetSections(HtmlReport& page, const DtrSet& set, const SetReportInfo& in
   page.Section("The set");
   page.Table({"", ""}, facts);
   if (!info.checks.empty()) {
-    page.Section("Can the calibration be trusted?");
+    page.Section("Validation of the calibration");
     AddChecks(page, info.checks);
   }
   for (const Frame& frame : set.frames) AddViews(page, frame.views, info);

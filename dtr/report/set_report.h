@@ -44,6 +44,8 @@ void AddSetSections(HtmlReport& page, const DtrSet& set, const SetReportInfo& in
 /// A whole page of these sections. Deterministic but for the times given.
 std::string SetReport(const DtrSet& set, const SetReportInfo& info);
 
+/// The result in one line: "validation passed".
+std::string ValidationResult(const std::vector<Check>& checks);
 /// Name, value, limit, outcome and reason of each check.
 void AddChecks(HtmlReport& page, const std::vector<Check>& checks);
 

@@ -113,6 +113,27 @@ TEST(ColorizeDepth, GivenRangeDecidesAndFlatMapsAreShown) {
   EXPECT_EQ(holes(1, 1, 1), kHoleColor[1]);
 }
 
+TEST(ScaleOfDepth, EndsAreThePercentilesOrWhatIsGiven) {
+  DepthImage depth(1000, 1);
+  for (int x = 0; x < 1000; ++x) depth(x, 0) = 1 / (0.1f + 0.001f * static_cast<float>(x));
+  const auto scale = ScaleOfDepth(depth);
+  ASSERT_TRUE(scale);
+  EXPECT_NEAR(scale->dark, 1 / 0.11, 0.05);
+  EXPECT_NEAR(scale->bright, 1 / 1.089, 0.005);
+  EXPECT_DOUBLE_EQ(ScaleOfDepth(depth, {Palette::kColor, 20, 0.5})->dark, 20);
+  EXPECT_FALSE(ScaleOfDepth(DepthImage(2, 2)));
+}
+
+TEST(ScaleOfSigma, IsInTheUnitOfItsValues) {
+  Grid<float> sigma(3, 1);
+  sigma(0, 0) = 1e-4f;
+  sigma(1, 0) = 1e-2f;
+  const auto scale = ScaleOfSigma(sigma);
+  ASSERT_TRUE(scale);
+  EXPECT_NEAR(scale->dark, 1e-4, 1e-8);
+  EXPECT_NEAR(scale->bright, 1e-2, 1e-6);
+}
+
 TEST(ColorizeSigma, BrightIsUncertain) {
   Grid<float> sigma(4, 1);
   sigma(0, 0) = 1e-4f;

@@ -15,13 +15,13 @@ using Inspect = SmallCourtyardSet;
 TEST_F(Inspect, WritesOnePageThatNeedsNothingElseTheSameEveryTime) {
   DtrOk({"inspect", Set(), "-o", In("one.html"), "--threads", "1"});
   const std::string page = Text(In("one.html"));
-  for (const char* section : {"Can the calibration be trusted?", "Photos, depth, uncertainty",
+  for (const char* section : {"Validation of the calibration", "Photos, depth, uncertainty",
                               "From above", "Worst views", "Which view contributes where"}) {
     EXPECT_THAT(page, HasSubstr(section));
   }
   EXPECT_THAT(page, HasSubstr("0001.jpg"));
   EXPECT_THAT(page, HasSubstr("data:image/svg+xml"));
-  EXPECT_THAT(page, HasSubstr("never validated"));  // nobody did
+  EXPECT_THAT(page, HasSubstr("not validated"));  // nobody did
   EXPECT_THAT(page, Not(HasSubstr("src=\"http")));
   EXPECT_THAT(page, Not(HasSubstr("<script")));
   DtrOk({"inspect", Set(), "-o", In("two.html"), "--threads", "3"});

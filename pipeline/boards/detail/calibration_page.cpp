@@ -85,7 +85,7 @@ std::string CalibrationPage(const calib::Calibration& calibration,
                             const std::optional<fs::path>& images) {
   report::HtmlReport page(title);
   page.Result(judged.passed(), calib::Conclusion(judged.tests, calib::Validated::kBoards));
-  page.Section("Can the calibration be trusted?");
+  page.Section("Validation of the calibration");
   report::AddChecks(page, judged.tests);
   AddCameraTable(page, judged);
   for (size_t c = 0; c < judged.cameras.size(); ++c) {

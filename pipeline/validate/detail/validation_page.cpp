@@ -192,7 +192,7 @@ std::string ValidationPage(const fs::path& folder, const DtrSet& set, const SetV
   const std::vector<View>& views = set.frames.front().views;
   report::HtmlReport page(title);
   page.Result(report.passed(), calib::Conclusion(report.tests, calib::Validated::kPhotos));
-  page.Section("Can the calibration be trusted?");
+  page.Section("Validation of the calibration");
   report::AddChecks(page, report.tests);
   if (!report.adjustment.not_validated.empty()) {
     page.Paragraph("Not validated by a fresh bundle adjustment: " +
