@@ -96,10 +96,12 @@ Controller::Controller(Surroundings surroundings, const Eigen::Vector3d& up, int
       fly_speed_(kSceneSizesPerSecond * SceneSize(surroundings_)) {
   if (surroundings_.views.empty()) {
     camera_ = {FillLens(lens_, width_px, height_px), {}};
+    home_ = {lens_, {}};
     return;
   }
   const View& first = *surroundings_.views[OpeningView(surroundings_.views, surroundings_.center)];
   lens_ = first.camera;
+  home_ = {lens_, first.cam_from_world};
   camera_ = {FillLens(lens_, width_px, height_px), first.cam_from_world};
   const auto& cameras = surroundings_.cameras;
   stepped_to_ =
@@ -261,9 +263,10 @@ void Controller::GoToNearestView() {
   if (const auto nearest = nearest_view()) GoToView(*nearest);
 }
 
-void Controller::ShowAll() {
-  const PinholeCamera lens = FillLens(lens_, camera_.camera.width_px(), camera_.camera.height_px());
-  GoTo({lens_, ViewAll(Foreground(surroundings_), PosesOf(surroundings_.views), up_, lens)});
+NovelCamera Controller::Overview() const {
+  const PinholeCamera lens =
+      FillLens(home_.camera, camera_.camera.width_px(), camera_.camera.height_px());
+  return {lens, ViewAll(Foreground(surroundings_), PosesOf(surroundings_.views), up_, lens)};
 }
 
 std::optional<size_t> Controller::nearest_view() const {

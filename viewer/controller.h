@@ -46,6 +46,10 @@ class Controller {
              DepthAt depth_at);
 
   const NovelCamera& camera() const { return camera_; }
+  /// Where it started, of the photo's own size.
+  const NovelCamera& home() const { return home_; }
+  /// Has the whole foreground in its image; of the window's size.
+  NovelCamera Overview() const;
   /// Intrinsics of the photo or file that it shows or glides to, before they fill the window.
   const PinholeCamera& lens() const { return lens_; }
   /// Scene units per second.
@@ -72,7 +76,6 @@ class Controller {
   void GoToView(size_t index);  ///< of `cameras`
   void StepViews(int by);       ///< from the view stepped to last, or the nearest
   void GoToNearestView();
-  void ShowAll();  ///< the foreground
   /// At once, without a glide.
   void JumpTo(const NovelCamera& camera);
 
@@ -107,7 +110,7 @@ class Controller {
   const DepthAt depth_at_;
   const Eigen::Vector3d up_;
   PinholeCamera lens_;  ///< of the photo or file that the camera shows or glides to
-  NovelCamera camera_;
+  NovelCamera camera_, home_;
   double orbit_rad_;  ///< by a drag across the image's longer side
   double fly_speed_;
   std::optional<Drag> drag_;

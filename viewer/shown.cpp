@@ -1,5 +1,7 @@
 #include "viewer/shown.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -86,6 +88,11 @@ Grid<float> SigmaImage(const Drawn& drawn, const SigmaOf& sigma_of) {
   return picture;
 }
 
+std::optional<Scale> With(const std::optional<report::ColorScale>& scale, Scale::Unit unit) {
+  if (!scale) return std::nullopt;
+  return Scale{scale->dark, scale->bright, unit};
+}
+
 }  // namespace
 
 const char* NameOf(Shown shown) {
@@ -141,26 +148,46 @@ Rgb ViewColours::Of(const View& view) const {
   return found != by_name_.end() ? found->second : Rgb{};
 }
 
-ImageRgb8 FalseColour(Shown shown, const Drawn& drawn, const SigmaOf& sigma_of) {
+std::string TextOf(double value, Scale::Unit unit, const std::string& length_unit) {
+  switch (unit) {
+    case Scale::Unit::kLength:
+      if (std::isinf(value)) return "infinity";
+      return fmt::format("{:.3g} {}", value, length_unit);
+    case Scale::Unit::kShare:
+      return fmt::format("{:.2g} %", 100 * value);
+    case Scale::Unit::kViews:
+      return fmt::format("{:.0f} {}", value, value == 1 ? "view" : "views");
+  }
+  return "";
+}
+
+FalseColours FalseColour(Shown shown, const Drawn& drawn, const SigmaOf& sigma_of) {
   const RenderResult& result = drawn.result;
   switch (shown) {
     case Shown::kColour:
     case Shown::kWireframe:
       break;
     case Shown::kDepth:
-      return report::ColorizeDepth(result.depth);
-    case Shown::kSigma:
-      return report::ColorizeSigma(SigmaImage(drawn, sigma_of));
+      return {report::ColorizeDepth(result.depth),
+              With(report::ScaleOfDepth(result.depth), Scale::Unit::kLength)};
+    case Shown::kSigma: {
+      const Grid<float> sigma = SigmaImage(drawn, sigma_of);
+      return {report::ColorizeSigma(sigma), With(report::ScaleOfSigma(sigma), Scale::Unit::kShare)};
+    }
     case Shown::kWeights:
-      return WeightImage(drawn);
-    case Shown::kViewCount:
-      return Painted(result, [&](size_t p) {
-        return report::PaletteColor(
-            report::Palette::kColor,
-            static_cast<double>(result.view_count.data()[p]) / std::max(drawn.options.views, 1));
-      });
+      return {WeightImage(drawn), {}};
+    case Shown::kViewCount: {
+      const int views = std::max(drawn.options.views, 1);
+      return {Painted(result,
+                      [&](size_t p) {
+                        return report::PaletteColor(
+                            report::Palette::kColor,
+                            static_cast<double>(result.view_count.data()[p]) / views);
+                      }),
+              Scale{0, static_cast<double>(views), Scale::Unit::kViews}};
+    }
     case Shown::kCoverage:
-      return Painted(result, [](size_t) { return kSeen; });
+      return {Painted(result, [](size_t) { return kSeen; }), {}};
   }
   throw std::invalid_argument("FalseColour: not a false colour");
 }

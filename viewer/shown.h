@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "dtr/render/camera_path.h"
@@ -48,8 +49,21 @@ struct Drawn {
   const ViewColours& colours;
 };
 
-/// A false-colour image; unseen pixels have report::kHoleColor. Not for kColour, which is the
+/// Values at the dark and the bright end of report::Palette::kColor.
+struct Scale {
+  enum class Unit { kLength, kShare, kViews };
+  double dark = 0, bright = 0;
+  Unit unit = Unit::kLength;
+};
+/// A value as text: "1.25 m", "0.4 %", "8 views". `length_unit`: "m" or "units".
+std::string TextOf(double value, Scale::Unit unit, const std::string& length_unit);
+
+struct FalseColours {
+  ImageRgb8 image;
+  std::optional<Scale> scale;  ///< none where colours stand for no number
+};
+/// False colours; unseen pixels have report::kHoleColor. Not for kColour, which is the
 /// image itself, nor for kWireframe, which keeps meshes (viewer/wireframe.h).
-ImageRgb8 FalseColour(Shown shown, const Drawn& drawn, const SigmaOf& sigma_of);
+FalseColours FalseColour(Shown shown, const Drawn& drawn, const SigmaOf& sigma_of);
 
 }  // namespace dtr::viewer

@@ -43,7 +43,7 @@ struct Options {
   std::string size = "1280x800", exclude;
   RendererChoice renderer;
   double memory_gb = 4;
-  int frames = 0, laps = 1, largest_divisor = 8;
+  int frames = 0, laps = 1, largest_divisor = 4;
   size_t time_step = 0;
   bool play = false, no_panel = false, cameras = false, photo = false, measured_only = false;
   std::shared_ptr<RenderOptions> render;
@@ -390,7 +390,7 @@ void AddViewCommand(CLI::App& app) {
         command.add_flag("--play", options->play, "Of a dynamic set: play it at once");
         command
             .add_option("--largest-divisor", options->largest_divisor,
-                        "While the camera moves, divide the image's sides by no more than N [8]")
+                        "While the camera moves, divide the image's sides by no more than N [4]")
             ->check(CLI::Range(1, viewer::ResolutionFrameRateController::kMaxDivisor))
             ->type_name("N");
         command.add_option("--size", options->size, "Size of the window [1280x800]")

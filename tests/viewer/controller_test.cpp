@@ -232,17 +232,30 @@ TEST_F(ControllerTest, WhereNothingIsSeenTheScenesMiddleSaysHowFar) {
   EXPECT_GT(Center(controller).norm(), 0.5 * before);
 }
 
-TEST_F(ControllerTest, ShowAllSeesTheWholeScene) {
+TEST_F(ControllerTest, OverviewHasTheWholeSceneWhereverTheCameraIs) {
   Controller controller = Make();
-  controller.ShowAll();
-  Wait(controller, 1);
+  controller.Handle(ScrollEvent{3, 320, 200});
+  const NovelCamera all = controller.Overview();
   for (const double x : {-4, 4}) {
-    const auto pixel = controller.camera().camera.PixelFromCam(controller.camera().cam_from_world *
-                                                               Eigen::Vector3d(x, x, 4));
+    const auto pixel = all.camera.PixelFromCam(all.cam_from_world * Eigen::Vector3d(x, x, 4));
     ASSERT_TRUE(pixel);
     EXPECT_GE(pixel->x(), -1e-6);
     EXPECT_LE(pixel->y(), kHeightPx + 1e-6);
   }
+}
+
+TEST_F(ControllerTest, HomeIsWhereItBegan) {
+  Controller controller = Make();
+  const NovelCamera start = controller.camera();
+  controller.Handle(ScrollEvent{3, 320, 200});
+  controller.StepViews(1);
+  Wait(controller, 1);
+  controller.GoTo(controller.home());
+  Wait(controller, 1);
+  EXPECT_LT(
+      (controller.camera().cam_from_world.translation - start.cam_from_world.translation).norm(),
+      1e-12);
+  EXPECT_EQ(controller.camera().camera.fx_px(), start.camera.fx_px());
 }
 
 TEST_F(ControllerTest, AnyInputLeavesAFinitePose) {
@@ -283,7 +296,7 @@ TEST_F(ControllerTest, AnyInputLeavesAFinitePose) {
 TEST_F(ControllerTest, AllThatIsShownLeavesOutTheSky) {
   const auto back = [&] {
     Controller controller = Make();
-    controller.ShowAll();
+    controller.GoTo(controller.Overview());
     Wait(controller, 1);
     return Center(controller).norm();
   };

@@ -182,6 +182,7 @@ std::vector<Controls::Row> Controls::WhereRows() {
       {"next", [this] { ClickUntilItIs("next", "at_view", "0003.jpg"); }},
       {"previous", [this] { ClickUntilItIs("previous", "at_view", "0002.jpg"); }},
       {"view all", [this] { ClickUntilItIs("view all", "at_view", ""); }},
+      {"home", [this] { ClickUntil("home", [](const Json& s) { return s["at_view"] != ""; }); }},
       {"nearest",
        [this] { ClickUntil("nearest", [](const Json& s) { return s["at_view"] != ""; }); }},
       {"speed per s",

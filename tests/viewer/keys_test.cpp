@@ -266,6 +266,11 @@ std::vector<Keys::Row> Keys::Rows() {
          After({"key", "v"}, "all in view", MovedFrom(start));
          Press("c");
        }},
+      {"Home",
+       [this] {
+         After({"key", "v"}, "all in view", [](const Json& s) { return s["at_view"] == ""; });
+         After({"key", "Home"}, "the start", [](const Json& s) { return s["at_view"] != ""; });
+       }},
       {"Down, Up", [this] { KindsOfImage(); }},
       {"F", [this] { Cameras(); }},
       {"G", [this] { Magnifier(); }},

@@ -138,7 +138,7 @@ TEST_F(ProbeTest, AViewKeepsItsColourWhateverElseIsLeftOut) {
   alone.views = {&last};  // the first of this scene, the third of the set
   const RenderResult result = cpu::Render(alone, novel_.camera, novel_.cam_from_world, options_);
   const ImageRgb8 picture =
-      FalseColour(Shown::kWeights, {result, alone, novel_, options_, colours}, SigmaOfView);
+      FalseColour(Shown::kWeights, {result, alone, novel_, options_, colours}, SigmaOfView).image;
   const Rgb colour = colours.Of(last);
   EXPECT_NE(colour, colours.Of(set_.frames[0].views[0]));
   ASSERT_NE(result.coverage(48, 36), 0);
@@ -153,7 +153,7 @@ TEST_F(ProbeTest, FalseColoursTellSeenFromUnseen) {
   const Drawn drawn{result, scene_, novel_, options_, colours};
   for (const Shown shown : kAllShown) {
     if (shown == Shown::kColour || shown == Shown::kWireframe) continue;
-    const ImageRgb8 picture = FalseColour(shown, drawn, SigmaOfView);
+    const ImageRgb8 picture = FalseColour(shown, drawn, SigmaOfView).image;
     ASSERT_EQ(picture.width(), 96);
     std::set<std::array<std::uint8_t, 3>> found;
     for (int y = 0; y < 72; ++y) {

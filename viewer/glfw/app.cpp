@@ -32,6 +32,7 @@ namespace {
 constexpr double kIdleSeconds = 0.25, kReadingSeconds = 0.02;  // between looks when nothing happens
 constexpr double kWatchSeconds = 0.5;  // between looks whether the set on the disk is another
 constexpr int kSettlingFrames = 3;     // ImGui needs some to show what a click changed
+constexpr char kOutside[] = "most of this was not photographed; Home leads back";
 
 class App {
  public:
@@ -168,7 +169,9 @@ class App {
       case Action::kNearestView:
         return controller().GoToNearestView();
       case Action::kShowAll:
-        return controller().ShowAll();
+        return controller().GoTo(session_->Overview(Order()));
+      case Action::kHome:
+        return controller().GoTo(controller().home());
       case Action::kHelp:
         help_ = !help_;
         return;
@@ -307,6 +310,12 @@ class App {
 
   bool whole() const { return session_->schedule.WholeFor(Order()); }
 
+  /// Less of the image was photographed than the rest of it.
+  bool IsOutside() const {
+    const MadeFrame& picture = session_->maker.picture();
+    return whole() && !picture.views_used.empty() && picture.coverage < 0.5;
+  }
+
   /// Gives the video its image once that is whole.
   void Film() {
     paths_.Tend();
@@ -350,6 +359,9 @@ class App {
       controls_ = std::move(model.controls);
       session_->ShowTimeStep(static_cast<size_t>(model.time.time_step));
     }
+    if (picture.scale) {
+      DrawScale(interface_, *picture.scale, session_->inspector.inspection().unit);
+    }
     if (help_) DrawHelp(interface_, help_);
     if (path_dialog_.open()) {
       if (const auto file = path_dialog_.Draw(interface_)) {
@@ -357,7 +369,8 @@ class App {
       }
     }
     const std::string progress = paths_.Progress();
-    const std::string& foot = progress.empty() ? message_ : progress;
+    std::string foot = progress.empty() ? message_ : progress;
+    if (IsOutside()) foot += (foot.empty() ? "" : "\n") + std::string(kOutside);
     if (!foot.empty()) DrawMessage(interface_, foot);
     interface_.EndFrame();
     for (const Action action : pressed) Do(action);

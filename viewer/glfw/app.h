@@ -43,7 +43,7 @@ struct AppSettings {
   size_t time_step = 0;              ///< of a dynamic set: the frame shown first
   bool play_time = false;            ///< of a dynamic set: from there on
   int frames = 0;                    ///< close after so many, once the image is whole; 0: never
-  int largest_divisor = 8;           ///< of the sides of images while moving
+  int largest_divisor = 4;           ///< of the sides of images while moving
   std::filesystem::path screenshot;  ///< of the window, written at the end; empty: none
 };
 

@@ -46,14 +46,14 @@ FrameMaker::FrameMaker(ViewStream& stream, ViewColours colours,
       renderer_(settings, drawer),
       sigma_of_(std::move(sigma_of)) {}
 
-ImageRgb8 FrameMaker::InFalseColour() {
+FalseColours FrameMaker::InFalseColour() {
   const Drawn drawn{Result(), picture_.scene, picture_.camera, picture_.options, colours_};
-  if (picture_.shown == Shown::kWireframe) return wireframe_.Draw(drawn);
+  if (picture_.shown == Shown::kWireframe) return {wireframe_.Draw(drawn), {}};
   return FalseColour(picture_.shown, drawn, sigma_of_);
 }
 
 ImageRgb8 FrameMaker::Image() {
-  return picture_.shown == Shown::kColour ? Result().image : InFalseColour();
+  return picture_.shown == Shown::kColour ? Result().image : InFalseColour().image;
 }
 
 void FrameMaker::MakeMoving(const FrameRequest& order, int divisor) {
@@ -150,8 +150,11 @@ void FrameMaker::BringPixels() {
 }
 
 void FrameMaker::Show(const FrameRequest& order, const gl::DrawnFrame& drawn, bool still) {
+  picture_.scale.reset();
   if (order.shown != Shown::kColour) {
-    picture_.texture.Upload(InFalseColour());
+    const FalseColours colours = InFalseColour();
+    picture_.texture.Upload(colours.image);
+    picture_.scale = colours.scale;
   } else if (NeedsFinishing(order.options)) {
     Result();
     FinishImage(picture_.scene, picture_.camera.camera, picture_.camera.cam_from_world,
@@ -161,6 +164,18 @@ void FrameMaker::Show(const FrameRequest& order, const gl::DrawnFrame& drawn, bo
     picture_.texture.Take(drawn);
   }
   if (still) picture_.coverage = Result().coverage_share;
+}
+
+double FrameMaker::CoverageOf(const FrameRequest& order) {
+  constexpr int kLongSidePx = 160;
+  if (!picture_.texture.empty()) Result();  // before the renderer forgets it
+  const PinholeCamera& window = order.camera.camera;
+  const int side_px = std::max(window.width_px(), window.height_px());
+  const PinholeCamera camera = Smaller(window, std::max(1, side_px / kLongSidePx));
+  stream_.ShowFrame(order.time_step);
+  stream_.Hide(order.hidden);
+  const RenderScene scene = SceneFor(order, camera, ViewStream::Wait::kForAll);
+  return renderer_.Render(scene, camera, order.camera.cam_from_world, order.options).coverage_share;
 }
 
 void FrameMaker::MakeOther(const RenderOptions& options) {

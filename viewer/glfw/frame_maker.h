@@ -46,7 +46,8 @@ struct MadeFrame {
   RenderOptions options;
   RenderScene scene;
   std::vector<int> views_used;
-  double coverage = 0;  ///< where the result was read back
+  double coverage = 0;         ///< where the result was read back
+  std::optional<Scale> scale;  ///< of false colours
   StageTimes ms;
 };
 
@@ -65,6 +66,9 @@ class FrameMaker {
 
   /// Begins to read what the same image of another time step needs, as far as there is room.
   void ReadAhead(const FrameRequest& order);
+
+  /// Share of the image's pixels that some view saw, of a small one.
+  double CoverageOf(const FrameRequest& order);
 
   /// Another image of the same camera beside the whole one, with other options.
   void MakeOther(const RenderOptions& options);
@@ -87,7 +91,7 @@ class FrameMaker {
   RenderScene SceneFor(const FrameRequest& order, const PinholeCamera& camera,
                        ViewStream::Wait wait);
   void ReleasePixels();
-  ImageRgb8 InFalseColour();
+  FalseColours InFalseColour();
   void Show(const FrameRequest& order, const gl::DrawnFrame& drawn, bool still);
 
   ViewStream& stream_;

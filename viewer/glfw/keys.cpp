@@ -16,7 +16,8 @@ constexpr std::array kHelp{
     HelpLine{"E Q", "fly up, down"},
     HelpLine{"Right, Left", "next, previous input camera"},
     HelpLine{"C", "nearest input camera"},
-    HelpLine{"V", "view all"},
+    HelpLine{"V", "view all that was photographed"},
+    HelpLine{"Home", "back to where the window began"},
     HelpLine{"Down, Up", "show the next, the previous kind of image"},
     HelpLine{"F", "input cameras with their photos and validation results on, off"},
     HelpLine{"G", "magnifying glass: depth, sigma, views and weights under the cursor"},
@@ -45,7 +46,7 @@ struct Binding {
 constexpr std::array kBindings{
     Binding{GLFW_KEY_RIGHT, Action::kNextView}, Binding{GLFW_KEY_LEFT, Action::kPreviousView},
     Binding{GLFW_KEY_C, Action::kNearestView},  Binding{GLFW_KEY_V, Action::kShowAll},
-    Binding{GLFW_KEY_HOME, Action::kShowAll},   Binding{GLFW_KEY_F1, Action::kHelp},
+    Binding{GLFW_KEY_HOME, Action::kHome},      Binding{GLFW_KEY_F1, Action::kHelp},
     Binding{GLFW_KEY_TAB, Action::kPanel},      Binding{GLFW_KEY_P, Action::kSaveImage},
     Binding{GLFW_KEY_F12, Action::kSaveWindow}, Binding{GLFW_KEY_L, Action::kCopyCommand},
     Binding{GLFW_KEY_DOWN, Action::kNextShown}, Binding{GLFW_KEY_UP, Action::kPreviousShown},

@@ -12,6 +12,7 @@ enum class Action {
   kPreviousView,
   kNearestView,
   kShowAll,
+  kHome,
   kHelp,
   kPanel,
   kSaveImage,

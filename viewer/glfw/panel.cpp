@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <imgui.h>
 
+#include "dtr/report/false_color.h"
 #include "viewer/glfw/widgets.h"
 
 namespace dtr::viewer {
@@ -82,7 +83,9 @@ void Figures(const PanelModel& model) {
   for (const int index : picture.views_used) {
     names.push_back(picture.scene.views[static_cast<size_t>(index)]->name);
   }
-  if (names.empty()) names.push_back("no view is valid here");
+  if (names.empty()) {
+    names.push_back(picture.whole ? "no view is valid here" : "views are being read");
+  }
   WrappedNames(fmt::format("drawn from {}:", picture.views_used.size()), names);
 }
 
@@ -100,6 +103,8 @@ void WhereControls(Widgets& widgets, PanelModel& model) {
   if (widgets.Arrow("next", ImGuiDir_Right)) model.pressed.push_back(Action::kNextView);
   ImGui::SameLine();
   if (widgets.Button("nearest")) model.pressed.push_back(Action::kNearestView);
+  ImGui::SameLine();
+  if (widgets.Button("home")) model.pressed.push_back(Action::kHome);
   ImGui::SameLine();
   if (widgets.Button("view all")) model.pressed.push_back(Action::kShowAll);
   double speed = controller.fly_speed();
@@ -222,6 +227,34 @@ void DrawHelp(UserInterface& interface, bool& open) {
       ImGui::TextUnformatted(line.what);
     }
     ImGui::EndTable();
+  }
+  interface.ThisPanelIsOurs();
+  ImGui::End();
+}
+
+void DrawScale(UserInterface& interface, const Scale& scale, const std::string& length_unit) {
+  const ImVec2 display = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos({0.5F * display.x, display.y - kMargin}, ImGuiCond_Always, {0.5F, 1});
+  ImGui::SetNextWindowBgAlpha(0.85F);
+  constexpr auto kFlags = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
+                          ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing;
+  if (ImGui::Begin("scale", nullptr, kFlags)) {
+    constexpr int kSteps = 64;
+    constexpr float kStepPx = 4;
+    PanelText(TextOf(scale.dark, scale.unit, length_unit));
+    ImGui::SameLine();
+    const ImVec2 corner = ImGui::GetCursorScreenPos();
+    const float height = ImGui::GetTextLineHeight();
+    for (int step = 0; step < kSteps; ++step) {
+      const Rgb colour = report::PaletteColor(report::Palette::kColor, step / (kSteps - 1.0));
+      const float left = corner.x + kStepPx * static_cast<float>(step);
+      ImGui::GetWindowDrawList()->AddRectFilled({left, corner.y},
+                                                {left + kStepPx, corner.y + height},
+                                                IM_COL32(colour[0], colour[1], colour[2], 255));
+    }
+    ImGui::Dummy({kSteps * kStepPx, height});
+    ImGui::SameLine();
+    PanelText(TextOf(scale.bright, scale.unit, length_unit));
   }
   interface.ThisPanelIsOurs();
   ImGui::End();

@@ -41,6 +41,8 @@ struct PanelModel {
 
 void DrawPanel(UserInterface& interface, PanelModel& model);
 void DrawHelp(UserInterface& interface, bool& open);
+/// The palette with the numbers at its ends, at the foot of the window.
+void DrawScale(UserInterface& interface, const Scale& scale, const std::string& length_unit);
 /// One line at the foot of the window.
 void DrawMessage(UserInterface& interface, const std::string& message);
 

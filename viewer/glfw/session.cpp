@@ -1,6 +1,7 @@
 #include "viewer/glfw/session.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "viewer/navigation.h"
@@ -71,6 +72,26 @@ void Session::ShowTimeStep(size_t time_step) {
   controller.SetSurroundings(SurroundingsOf(opened_->set, time_step));
   inspector.inspection().hidden.clear();
   Hide(hidden);
+}
+
+NovelCamera Session::Overview(FrameRequest request) {
+  constexpr double kMinShare = 0.9;  // of the coverage at home
+  constexpr int kHalvings = 8;
+  const PinholeCamera& window = controller.camera().camera;
+  const NovelCamera& home = controller.home();
+  request.camera = {FillLens(home.camera, window.width_px(), window.height_px()),
+                    home.cam_from_world};
+  const NovelCamera from = request.camera, to = controller.Overview();
+  const double min_coverage = kMinShare * maker.CoverageOf(request);
+  const auto covers = [&](double share) {
+    request.camera = Between(from, to, share);
+    return maker.CoverageOf(request) >= min_coverage;
+  };
+  double share = covers(1) ? 1 : 0;
+  for (double step = 0.5; share < 1 && step > std::ldexp(1.0, -kHalvings - 1); step /= 2) {
+    if (covers(share + step)) share += step;
+  }
+  return {home.camera, Between(from, to, share).cam_from_world};
 }
 
 void Session::RetryLostViews() {
