@@ -154,13 +154,15 @@ Findings FindOut(const DtrSet& set, ViewStream& stream, const InspectFacts& fact
 
 std::string PercentText(double share) { return fmt::format("{:.1f} %", 100 * share); }
 
-void AddValidation(report::HtmlReport& page, const InspectFacts& facts) {
+void AddResult(report::HtmlReport& page, const InspectFacts& facts) {
+  page.Result(AllPassed(facts.checks), facts.checks.empty()
+                                           ? "not validated: run dtr validate"
+                                           : report::ValidationResult(facts.checks));
+}
+
+void AddTests(report::HtmlReport& page, const InspectFacts& facts) {
+  if (facts.checks.empty()) return;
   page.Section("Validation of the calibration");
-  if (facts.checks.empty()) {
-    page.Result(false, "not validated: run dtr validate");
-    return;
-  }
-  page.Result(AllPassed(facts.checks), report::ValidationResult(facts.checks));
   report::AddChecks(page, facts.checks);
 }
 
@@ -312,13 +314,14 @@ std::string InspectPage(const DtrSet& set, ViewStream& stream, const InspectFact
                         const RenderOptions& options, Progress& progress) {
   const Findings findings = FindOut(set, stream, facts, options, progress);
   report::HtmlReport page("Inspection of " + facts.name);
+  AddResult(page, facts);
   page.Paragraph(fmt::format("{} source views; lengths in {}.", findings.views.size(),
                              set.unit == LengthUnit::kMetre ? "metres" : "scene units"));
-  AddValidation(page, facts);
   AddGalleries(page, findings, set.unit);
   AddMaps(page, set, findings, facts);
   AddWorstViews(page, findings, facts);
   AddContributions(page, set, findings);
+  AddTests(page, facts);
   AddCosts(page, facts);
   if (facts.add_further) facts.add_further(page);
   return page.Finish();

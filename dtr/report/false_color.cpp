@@ -65,7 +65,7 @@ std::optional<ColorScale> Percentiles(std::vector<double>& values) {
   return ColorScale{low, high};
 }
 
-/// Of inverse depth.
+/// Scale of inverse depth.
 std::optional<ColorScale> InverseScale(const DepthImage& depth, const DepthColors& colors) {
   std::vector<double> inverse;
   inverse.reserve(depth.grid().data().size());

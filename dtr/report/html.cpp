@@ -1,5 +1,6 @@
 #include "dtr/report/html.h"
 
+#include <algorithm>
 #include <cctype>
 #include <stdexcept>
 
@@ -34,7 +35,8 @@ th { text-align: left; font-weight: 600; color: var(--soft); font-size: .85rem; 
 th, td { padding: .45rem .8rem; border-bottom: 1px solid var(--line); vertical-align: middle;
   overflow-wrap: break-word; }
 tbody tr:last-child td { border-bottom: 0; }
-.number { text-align: right; white-space: nowrap; }
+.number { text-align: right; }
+.number, .brief { white-space: nowrap; }
 td img { display: block; max-width: 20rem; height: auto; border-radius: .25rem; }
 figure { margin: 1rem 0; }
 figure img { display: block; max-width: 100%; height: auto; border-radius: .4rem; }
@@ -44,6 +46,13 @@ figure.plot svg { display: block; width: 100%; height: auto; border: 1px solid v
 figcaption { color: var(--soft); font-size: .9rem; margin-top: .35rem; overflow-wrap: break-word; }
 .gallery { display: flex; flex-wrap: wrap; gap: .8rem; align-items: end; }
 .gallery figure { margin: 0; max-width: 100%; break-inside: avoid; }
+@media screen and (max-width: 40rem) {  /* a phone: a row is a block, each cell has its column's name */
+  thead { display: none; }
+  tr { display: block; padding: .5rem 0; border-bottom: 1px solid var(--line); }
+  td { display: block; border: 0; padding: .1rem .8rem; }
+  .number { text-align: left; }
+  td::before { content: attr(data-column); color: var(--soft); margin-right: .5rem; }
+  td img { max-width: 100%; } }
 @media print { body { background: #fff; color: #000; max-width: none; } }
 )css";
 
@@ -71,6 +80,29 @@ bool LooksLikeNumber(const Cell& cell) {
   return i > first && is_digit(first) && is_digit(i - 1) && text->size() - i <= 4;
 }
 
+/// A few words, which a line has room for.
+bool IsBrief(const Cell& cell) {
+  constexpr size_t kMaxBytes = 16;
+  const auto* text = std::get_if<std::string>(&cell);
+  return text != nullptr && text->size() <= kMaxBytes;
+}
+
+/// Classes of the columns of a table.
+std::vector<const char*> ClassesOf(size_t columns, const std::vector<std::vector<Cell>>& rows) {
+  std::vector<const char*> classes(columns, "");
+  for (size_t i = 0; i < columns && !rows.empty(); ++i) {
+    const auto all = [&](bool (*holds)(const Cell&)) {
+      return std::all_of(rows.begin(), rows.end(), [&](const auto& row) { return holds(row[i]); });
+    };
+    if (all(LooksLikeNumber)) {
+      classes[i] = " class=\"number\"";
+    } else if (all(IsBrief)) {
+      classes[i] = " class=\"brief\"";
+    }
+  }
+  return classes;
+}
+
 }  // namespace
 
 HtmlReport::HtmlReport(std::string_view title) : title_(EscapeHtml(title)) {}
@@ -89,17 +121,16 @@ void HtmlReport::Result(bool good, std::string_view text) {
 
 void HtmlReport::Table(const std::vector<std::string>& header,
                        const std::vector<std::vector<Cell>>& rows) {
-  std::vector<bool> number(header.size(), !rows.empty());
   for (const auto& row : rows) {
     if (row.size() != header.size()) {
       throw std::invalid_argument(
           "HtmlReport::Table: a row has another number of cells than the "
           "header");
     }
-    for (size_t i = 0; i < row.size(); ++i) number[i] = number[i] && LooksLikeNumber(row[i]);
   }
-  const auto open = [&](const char* tag, size_t column) {
-    return std::string("<") + tag + (number[column] ? " class=\"number\">" : ">");
+  const std::vector<const char*> classes = ClassesOf(header.size(), rows);
+  const auto open = [&](const std::string& tag, size_t column) {
+    return "<" + tag + classes[column] + ">";
   };
   body_ += "<div class=\"scroll\"><table><thead><tr>";
   for (size_t i = 0; i < header.size(); ++i) {
@@ -109,7 +140,7 @@ void HtmlReport::Table(const std::vector<std::string>& header,
   for (const auto& row : rows) {
     body_ += "<tr>";
     for (size_t i = 0; i < row.size(); ++i) {
-      body_ += open("td", i);
+      body_ += open("td data-column=\"" + EscapeHtml(header[i]) + "\"", i);
       if (const auto* text = std::get_if<std::string>(&row[i])) {
         body_ += EscapeHtml(*text);
       } else {

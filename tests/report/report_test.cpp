@@ -199,7 +199,7 @@ TEST(HtmlReport, NumbersStandUnderEachOtherAndNamesThatBeginWithDigitsDoNot) {
   HtmlReport page("t");
   page.Table({"view", "share"}, {{std::string("0010.jpg"), std::string("12.5 %")}});
   const std::string html = page.Finish();
-  EXPECT_THAT(html, HasSubstr("<td>0010.jpg"));
+  EXPECT_THAT(html, HasSubstr("<td data-column=\"view\" class=\"brief\">0010.jpg"));
   EXPECT_THAT(html, HasSubstr("class=\"number\">12.5 %"));
 }
 
