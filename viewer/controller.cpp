@@ -224,6 +224,11 @@ void Controller::Resize(int width_px, int height_px) {
   camera_.camera = glide_ ? FillLens(camera_.camera, width_px, height_px) : lens;
 }
 
+void Controller::StartAt(const NovelCamera& camera) {
+  home_ = camera;
+  JumpTo(camera);
+}
+
 void Controller::JumpTo(const NovelCamera& camera) {
   glide_.reset();
   drag_.reset();

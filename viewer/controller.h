@@ -46,7 +46,7 @@ class Controller {
              DepthAt depth_at);
 
   const NovelCamera& camera() const { return camera_; }
-  /// Where it started, of the photo's own size.
+  /// Camera that it started at, of the photo's own size.
   const NovelCamera& home() const { return home_; }
   /// Has the whole foreground in its image; of the window's size.
   NovelCamera Overview() const;
@@ -76,6 +76,8 @@ class Controller {
   void GoToView(size_t index);  ///< of `cameras`
   void StepViews(int by);       ///< from the view stepped to last, or the nearest
   void GoToNearestView();
+  /// Begins there instead: home, too.
+  void StartAt(const NovelCamera& camera);
   /// At once, without a glide.
   void JumpTo(const NovelCamera& camera);
 

@@ -62,7 +62,7 @@ struct FalseColours {
   ImageRgb8 image;
   std::optional<Scale> scale;  ///< none where colours stand for no number
 };
-/// False colours; unseen pixels have report::kHoleColor. Not for kColour, which is the
+/// False colours; pixels that no view saw have report::kHoleColor. Not for kColour, which is the
 /// image itself, nor for kWireframe, which keeps meshes (viewer/wireframe.h).
 FalseColours FalseColour(Shown shown, const Drawn& drawn, const SigmaOf& sigma_of);
 

@@ -81,7 +81,7 @@ class ViewerProgram {
   }
 
   struct End {
-    int code = -1;     // -1 where a signal ended it or it never came
+    int code = -1;     // -1 where a signal ended it
     double cpu_s = 0;  // of all threads: from the signal on, or in all
   };
   End EndBy(int signal) {
@@ -99,7 +99,10 @@ class ViewerProgram {
     int status = 0;
     rusage used{};
     while (wait4(child_, &status, WNOHANG, &used) == 0) {
-      if (std::chrono::steady_clock::now() - start > kPatience) return {};
+      if (std::chrono::steady_clock::now() - start > kPatience) {
+        ADD_FAILURE() << "the viewer never ended";
+        return {};
+      }
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
     child_ = -1;
@@ -109,7 +112,7 @@ class ViewerProgram {
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1,
             seconds(used.ru_utime) + seconds(used.ru_stime)};
   }
-  // Of all its threads until now.
+  // CPU time of all its threads until now, s.
   double CpuSeconds() const {
     clockid_t clock{};
     timespec time{};

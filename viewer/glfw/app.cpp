@@ -53,7 +53,7 @@ class App {
     Inspection& inspection = session_->inspector.inspection();
     inspection.cameras = settings.cameras;
     if (settings.photo) inspection.compared = Compared::kPhoto;
-    if (settings.start) controller().JumpTo(*settings.start);
+    if (settings.start) controller().StartAt(*settings.start);
     session_->ShowTimeStep(settings.time_step);
     if (settings.play_time) PlayOrStop();
     if (!settings.warning.empty()) message_ = settings.warning;
@@ -169,7 +169,7 @@ class App {
       case Action::kNearestView:
         return controller().GoToNearestView();
       case Action::kShowAll:
-        return controller().GoTo(session_->Overview(Order()));
+        return ShowAll();
       case Action::kHome:
         return controller().GoTo(controller().home());
       case Action::kHelp:
@@ -231,6 +231,14 @@ class App {
       case Action::kQuit:
         quit_ = true;
         return;
+    }
+  }
+
+  void ShowAll() {
+    try {
+      controller().GoTo(session_->Overview(Order()));
+    } catch (const std::exception& error) {
+      Tell(Said(error));
     }
   }
 
@@ -310,10 +318,9 @@ class App {
 
   bool whole() const { return session_->schedule.WholeFor(Order()); }
 
-  /// Less of the image was photographed than the rest of it.
+  /// Less than half as much was photographed as of the best image so far.
   bool IsOutside() const {
-    const MadeFrame& picture = session_->maker.picture();
-    return whole() && !picture.views_used.empty() && picture.coverage < 0.5;
+    return whole() && session_->maker.picture().coverage < 0.5 * best_coverage_;
   }
 
   /// Gives the video its image once that is whole.
@@ -325,6 +332,7 @@ class App {
   }
 
   void DrawInterface() {
+    if (whole()) best_coverage_ = std::max(best_coverage_, session_->maker.picture().coverage);
     session_->inspector.Look(whole(), options_, interface_.cursor_px());
     interface_.BeginFrame();
     const MadeFrame& picture = session_->maker.picture();
@@ -496,7 +504,7 @@ class App {
   bool save_picture_ = false, save_window_ = false, copy_command_ = false;
   size_t played_ = 0;
   int settling_ = kSettlingFrames;
-  double window_ms_ = 0, moving_fps_ = 0;
+  double window_ms_ = 0, moving_fps_ = 0, best_coverage_ = 0;
 };
 
 }  // namespace

@@ -43,6 +43,7 @@ Eigen::Vector3d Session::ContinueFrom(const Session& before) {
   const Eigen::Vector3d shift = opened_->set.world_origin - before.opened_->set.world_origin;
   NovelCamera there = InMovedWorld(before.controller.camera(), shift);
   there.camera = before.controller.lens();
+  controller.StartAt(InMovedWorld(before.controller.home(), shift));
   controller.JumpTo(there);
   controller.set_fly_speed(before.controller.fly_speed());
   Inspection& mine = inspector.inspection();

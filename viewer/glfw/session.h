@@ -40,8 +40,8 @@ class Session {
   void ShowTimeStep(size_t time_step);
   const FrameClock& clock() const { return clock_; }
 
-  /// The camera furthest from home, on the line to one that has the whole foreground in its image,
-  /// with 90 % of the coverage at home; home itself where none is.
+  /// A camera on the line from home to one that has the whole foreground in its image, as far as
+  /// halving finds 90 % of the coverage at home.
   NovelCamera Overview(FrameRequest request);
 
   /// Tries views again that could not be read and whose files have changed since, or came back.
