@@ -42,7 +42,7 @@ struct DepthEstimate {
 
 /// How much work goes into a depth map. Every value may change the result.
 struct QualitySettings {
-  int neighbours = 5;       ///< views that the search asks, at most
+  int neighbours = 5;       ///< views that the search compares with, at most
   int pass_neighbours = 8;  ///< views that the passes and the final filter ask, at most 8
   /// Visits per pixel on the levels between the coarsest (two more) and full size (two fewer, but
   /// one at least).
@@ -102,7 +102,7 @@ class Engine {
                           std::span<const int> neighbours, const DepthRange& range,
                           std::span<const PlaneMap* const> maps, int pass,
                           const EngineOptions& options) const;
-  /// What of the planes after the last pass is believed, and how much.
+  /// Filters the planes after the last pass: depth and sigma.
   virtual DepthEstimate Filter(std::span<const StereoView> views, int reference,
                                std::span<const int> neighbours, const DepthRange& range,
                                std::span<const PlaneMap* const> maps,

@@ -26,7 +26,7 @@ constexpr Limits kAfterSearch{0.8f, 1.0f, 1};
 /// Passes have settled the planes by what all views know: looks may differ more. On plaza, share of
 /// all true pixels within 1 % and outliers after all checks: 79.8 % and 1.1 % with the limits
 /// above, 84.2 % and 2.8 % with these (4 px then, of sigmas that were 0.8 times as large).
-constexpr Limits kAfterRounds{1.0f, 5.0f, 0};
+constexpr Limits kAfterPasses{1.0f, 5.0f, 0};
 /// Least variance of the pixels that look like the centre (grey levels squared). A window of sky at
 /// a roof has the roof's texture, and would get its depth.
 constexpr float kMinTexture = 3.0f;
@@ -151,7 +151,7 @@ class DepthFilter {
 
   /// By what the images say of each pixel alone, and of whole areas.
   void KeepConsistent() {
-    const Limits limits = HasSurfaces(level_) ? kAfterRounds : kAfterSearch;
+    const Limits limits = HasSurfaces(level_) ? kAfterPasses : kAfterSearch;
     Grid<std::uint8_t> consistent(width(), height());
     ParallelFor(0, height(), [&](int y) {
       std::vector<PixelEstimate> row(static_cast<size_t>(width()));

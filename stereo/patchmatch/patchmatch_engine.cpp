@@ -36,8 +36,8 @@ constexpr int kRefineIterations = 1;
 constexpr int kFollowIterations = 3;
 /// Open pixels whose followed plane costs more than this are searched for from nothing.
 constexpr float kLostCost = 0.5f;
-constexpr int kFollowRoundNumber = 500;  // names its random numbers apart from the search's
-constexpr int kFirstPassNumber = 1000;   // names random numbers apart from the search's
+constexpr int kFollowPassNumber = 500;  // names its random numbers apart from the search's
+constexpr int kFirstPassNumber = 1000;  // names random numbers apart from the search's
 /// A pair whose rays to the middle of the range meet at less than this has no baseline.
 constexpr double kSmallestDisparityPx = 0.5;
 
@@ -232,7 +232,7 @@ struct Problem {
     State state = Resume(begin, options);
     SuggestBackground(&state);
     Sweep sweep;
-    int number = kFollowRoundNumber;
+    int number = kFollowPassNumber;
     RunSweeps(finest, sweep, kFollowIterations, 2 * kFinestStepPx, &number, &state);
     const Mask lost = LostPixels(finest, state, time_step->open);
     if (std::none_of(lost.data().begin(), lost.data().end(), [](auto m) { return m != 0; })) {

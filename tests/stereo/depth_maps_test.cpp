@@ -45,7 +45,7 @@ class CountingEngine final : public WallEngine, public CountsLeftOut {
 
 /// A plane's inverse depth is 1/4 + 0.001 view at first; a pass adds a tenth of what the view and
 /// its neighbours had: any other order, or a map of the wrong pass, shows.
-class RoundsEngine final : public Engine {
+class PassesEngine final : public Engine {
  public:
   std::string name() const override { return "passes"; }
   int Passes() const override { return 2; }
@@ -249,8 +249,8 @@ TEST(ComputeDepthMaps, GivenRangesReplaceThePoints) {
   EXPECT_THROW(Compute(row, engine, options, progress), UsageError);
 }
 
-TEST(RunAllPasses, ARoundReadsOnlyTheRoundBefore) {
-  RoundsEngine engine;
+TEST(RunAllPasses, APassReadsOnlyThePassBefore) {
+  PassesEngine engine;
   Recorder progress;
   const Row row = Cameras(3);
   const ThreadLimit limit(4);
@@ -267,7 +267,7 @@ TEST(RunAllPasses, ARoundReadsOnlyTheRoundBefore) {
 }
 
 TEST(RunAllPasses, GoesOnFromWhatTheStoreHasToTheSameBytes) {
-  RoundsEngine engine;
+  PassesEngine engine;
   Recorder progress;
   const Row row = Cameras(4);
   const ThreadLimit limit(1);
@@ -289,7 +289,7 @@ TEST(RunAllPasses, GoesOnFromWhatTheStoreHasToTheSameBytes) {
 }
 
 TEST(RunAllPasses, AViewWithoutAPairHasNoPlanesForItsNeighboursEither) {
-  RoundsEngine engine;
+  PassesEngine engine;
   engine.reject = 1;
   Recorder progress;
   const ThreadLimit limit(1);

@@ -175,7 +175,7 @@ TEST(PatchMatchEngine, InstructionSetsThatRoundAlikeFindTheSameBytes) {
 }
 
 /// The first view after all passes, with every other view as everyone's neighbour.
-DepthEstimate AfterRounds(const std::vector<StereoView>& views, int threads = 2) {
+DepthEstimate AfterPasses(const std::vector<StereoView>& views, int threads = 2) {
   const ThreadLimit limit(threads);
   const auto engine = MakeEngine("patchmatch");
   const int count = static_cast<int>(views.size());
@@ -211,29 +211,29 @@ std::vector<Shot> SphereFrom(size_t count) {
   return Shots(SphereBeforeWall(), poses);
 }
 
-TEST(PatchMatchEngine, RoundsFillWhatOneViewAloneGetsWrong) {
+TEST(PatchMatchEngine, PassesFillWhatOneViewAloneGetsWrong) {
   const auto shots = SphereFrom(5);
   const auto views = ViewsOf(shots);
   const Quality alone = QualityOf(EstimateFirst(views), shots[0].truth);
-  const Quality together = QualityOf(AfterRounds(views), shots[0].truth);
+  const Quality together = QualityOf(AfterPasses(views), shots[0].truth);
   EXPECT_GT(together.kept * (1 - together.bad_share), alone.kept * (1 - alone.bad_share));
   EXPECT_GT(together.kept, 0.97);
   EXPECT_LT(together.median_px, kMedianPx);
   EXPECT_LT(together.bad_share, 0.03);
 }
 
-TEST(PatchMatchEngine, TheNumberOfThreadsChangesNoBitOfTheRounds) {
+TEST(PatchMatchEngine, TheNumberOfThreadsChangesNoBitOfThePasses) {
   const auto shots = SphereFrom(3);
   const auto views = ViewsOf(shots);
-  const DepthEstimate one = AfterRounds(views, 1), three = AfterRounds(views, 3);
+  const DepthEstimate one = AfterPasses(views, 1), three = AfterPasses(views, 3);
   EXPECT_EQ(one.depth, three.depth);
   EXPECT_EQ(one.inverse_depth_sigma, three.inverse_depth_sigma);
 }
 
-TEST(PatchMatchEngine, InstructionSetsThatRoundAlikeGiveTheSameBytesAfterTheRounds) {
+TEST(PatchMatchEngine, InstructionSetsThatRoundAlikeGiveTheSameBytesAfterThePasses) {
   const auto shots = SphereFrom(2);
   const auto views = ViewsOf(shots);
-  ExpectTheSameFromAllInstructionSets(shots[0].truth, [&] { return AfterRounds(views); });
+  ExpectTheSameFromAllInstructionSets(shots[0].truth, [&] { return AfterPasses(views); });
 }
 
 TEST(PatchMatchEngine, SigmaDescribesTheError) {
