@@ -48,9 +48,16 @@ Found CommandOf(CLI::App& app, const std::vector<std::string>& words) {
 }
 
 const CLI::Option* OptionCalled(const CLI::App& command, const std::string& name) {
-  for (const CLI::Option* option : OptionsOf(command)) {
-    const auto& names = option->get_lnames();
-    if (std::find(names.begin(), names.end(), name) != names.end()) return option;
+  const auto of = [&](const CLI::App& app) -> const CLI::Option* {
+    for (const CLI::Option* option : app.get_options()) {  // earlier names too, which are hidden
+      const auto& names = option->get_lnames();
+      if (std::find(names.begin(), names.end(), name) != names.end()) return option;
+    }
+    return nullptr;
+  };
+  if (const CLI::Option* option = of(command)) return option;
+  for (const CLI::App* group : AlternativesOf(command)) {
+    if (const CLI::Option* option = of(*group)) return option;
   }
   return nullptr;
 }
