@@ -244,7 +244,7 @@ std::vector<NovelCamera> FlyThrough(const DtrSet& set, int frames, const DepthLo
   std::vector<Key> chain = Chain(Thinned(SourceKeys(set), kMaxChained));
   std::vector<const View*> views;
   for (const Key& key : chain) views.push_back(key.view);
-  const FreeSpace space(views, UsualStep(chain), load_depth);
+  const FreeSpace space(views, 0.5 * UsualStep(chain), load_depth);
   for (Key& key : chain) key.scene_z = space.SceneZ(key.center);
   const std::vector<Key> piece = LongestFreePiece(chain, space);
   const View& first = *piece.front().view;
