@@ -34,7 +34,7 @@ struct Context {
 };
 
 /// Exit codes of the command line.
-enum ExitCode { kDone = 0, kFailed = 1, kWrongUsage = 2 };
+enum ExitCode { kDone = 0, kFailed = 1, kWrongUsage = 2, kUndecided = 3 };
 
 /// The commands of another program than `dtr` (run_command.h).
 class CalledApp : public CLI::App {

@@ -29,6 +29,7 @@ constexpr LeftOut kMayBeLeftOut[] = {
     {"export", "DTR_WITH_EXPORT", DTR_WITH_EXPORT},
     {"import", "DTR_WITH_IMPORT", DTR_WITH_IMPORT},
     {"prune", "DTR_WITH_PRUNE", DTR_WITH_PRUNE},
+    {"validate CAMERAS", "DTR_WITH_IMPORT", DTR_WITH_IMPORT},
     {"validate CALIB", "DTR_WITH_BOARDS", DTR_WITH_BOARDS},
 };
 

@@ -14,6 +14,7 @@ constexpr size_t kNamed = 4;  // failed tests that the sentence names
 struct Remedy {
   const char* test;
   const char* what_to_do;
+  bool is_of_evidence = false;  ///< the photos lack what the test needs; they contradict nothing
 };
 
 // In both tables causes stand before what they cause.
@@ -67,12 +68,13 @@ constexpr const char* kCameraModel =
 constexpr Remedy kOfPhotos[] = {
     {"given_cameras_px", "correct the cameras that were given as the test's line says"},
     {"degeneracies",
-     "take photos as docs/VALIDATION.md says for what is named, or give the camera (`lens`)"},
+     "take photos as docs/VALIDATION.md says for what is named, or give the camera (`lens`)", true},
     {"undetermined_terms",
      "give the cameras less freedom: photos of one camera and zoom share their intrinsics "
-     "(`camera_per` folder), or give the camera (`lens`)"},
-    {"photos_not_validated", kMorePhotos},
-    {"cameras_untested", kMorePhotos},
+     "(`camera_per` folder), or give the camera (`lens`)",
+     true},
+    {"photos_not_validated", kMorePhotos, true},
+    {"cameras_untested", kMorePhotos, true},
     {"impossible_share", kAgain},
     {"worst_camera_rms_px", kAgain},
     {"worst_camera_ratio", kAgain},
@@ -90,7 +92,7 @@ constexpr Remedy kOfPhotos[] = {
     {"halves_ratio", kCameraModel},
     {"held_out_rms_px", kCameraModel},
     {"stored_rms_px", kAgain},
-    {"image_shift_px", "take more photos, from more sides, of what the view named shows"},
+    {"image_shift_px", "take more photos, from more sides, of what the view named shows", true},
     {"cross_depth_px", "compute the depth maps again (dtr stereo), or calibrate again"},
     {"worst_view_cross_depth_px",
      "look at the depth map of the view named (dtr inspect); leave it out, or calibrate again"},
@@ -107,20 +109,42 @@ std::string ValueAndLimit(const Check& test) {
                                 : fmt::format("{:.4g} ({})", test.value, limit);
 }
 
-std::string FirstRemedy(std::span<const Check> failed, Validated what) {
+std::string Measured(const Check& test) {
+  return fmt::format("{}: {}: {}", test.name, ValueAndLimit(test), test.reason);
+}
+
+struct Cause {
+  const Check* test;
+  std::string what_to_do;
+};
+
+// The failed test that explains the others.
+Cause CauseOf(std::span<const Check> failed, Validated what) {
   for (const Remedy& remedy : RemediesFor(what)) {
-    const bool applies = std::any_of(failed.begin(), failed.end(),
-                                     [&](const Check& test) { return test.name == remedy.test; });
-    if (applies) return remedy.what_to_do;
+    const auto test = std::find_if(failed.begin(), failed.end(),
+                                   [&](const Check& t) { return t.name == remedy.test; });
+    if (test != failed.end()) return {&*test, remedy.what_to_do};
   }
-  return "docs/VALIDATION.md says what each test measures";
+  return {&failed.front(), "docs/VALIDATION.md says what each test measures"};
+}
+
+std::vector<Check> FailedOf(std::span<const Check> tests) {
+  std::vector<Check> failed;
+  std::copy_if(tests.begin(), tests.end(), std::back_inserter(failed),
+               [](const Check& test) { return !test.passed; });
+  return failed;
+}
+
+bool IsOfEvidence(const Check& test) {
+  const auto named = std::find_if(std::begin(kOfPhotos), std::end(kOfPhotos),
+                                  [&](const Remedy& remedy) { return test.name == remedy.test; });
+  return std::isnan(test.value) || (named != std::end(kOfPhotos) && named->is_of_evidence);
 }
 
 }  // namespace
 
 std::string LineOf(const Check& test) {
-  return fmt::format("{} {}: {}: {}", ResultWord(test.passed), test.name, ValueAndLimit(test),
-                     test.reason);
+  return fmt::format("{} {}", ResultWord(test.passed), Measured(test));
 }
 
 std::string RemedyOf(const std::string& test, Validated what) {
@@ -134,9 +158,7 @@ std::string Conclusion(std::span<const Check> tests, Validated what) {
   if (tests.empty()) {
     return fmt::format("validation {}: nothing could be tested", ResultWord(false));
   }
-  std::vector<Check> failed;
-  std::copy_if(tests.begin(), tests.end(), std::back_inserter(failed),
-               [](const Check& test) { return !test.passed; });
+  const std::vector<Check> failed = FailedOf(tests);
   if (failed.empty()) {
     return fmt::format("validation {}: all tests ({}) are within their limits", ResultWord(true),
                        tests.size());
@@ -149,7 +171,31 @@ std::string Conclusion(std::span<const Check> tests, Validated what) {
   return fmt::format("validation {}: {} of {} tests {}: {}; {}", ResultWord(false), failed.size(),
                      tests.size(),
                      failed.size() == 1 ? "is beyond its limit" : "are beyond their limits", named,
-                     FirstRemedy(failed, what));
+                     CauseOf(failed, what).what_to_do);
+}
+
+Answer AnswerOf(std::span<const Check> tests) {
+  const std::vector<Check> failed = FailedOf(tests);
+  if (failed.empty()) return tests.empty() ? Answer::kUndecided : Answer::kRight;
+  return std::all_of(failed.begin(), failed.end(), IsOfEvidence) ? Answer::kUndecided
+                                                                 : Answer::kWrong;
+}
+
+std::string AnswerLine(std::span<const Check> tests, size_t photos, double within_px) {
+  if (tests.empty()) return "not decidable: nothing could be tested";
+  if (AnswerOf(tests) == Answer::kRight) {
+    return fmt::format(
+        "right: 95 % of what {} photos show lies within {:.2g} px of where the other photos "
+        "predict "
+        "it",
+        photos, within_px);
+  }
+  std::vector<Check> failed = FailedOf(tests);
+  const bool is_wrong = AnswerOf(tests) == Answer::kWrong;
+  if (is_wrong) std::erase_if(failed, IsOfEvidence);
+  const Cause cause = CauseOf(failed, Validated::kPhotos);
+  return fmt::format("{}: {}; {}", is_wrong ? "wrong" : "not decidable", Measured(*cause.test),
+                     cause.what_to_do);
 }
 
 }  // namespace dtr::calib

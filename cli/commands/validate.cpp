@@ -6,13 +6,12 @@
 #include "calib/validation/conclusion.h"
 #include "cli/command.h"
 #include "cli/commands/validate_calibration.h"
+#include "cli/commands/validate_set.h"
 #include "cli/number_checks.h"
 #include "cli/output_file.h"
 #include "cli/suggestions.h"
 #include "dtr/base/error.h"
-#include "dtr/base/files.h"
-#include "dtr/io/set_io.h"
-#include "dtr/render/time_steps.h"
+#include "pipeline/core/camera_file.h"
 #include "pipeline/validate/validate.h"
 
 namespace dtr::cli {
@@ -22,29 +21,9 @@ struct ValidateArguments {
   std::filesystem::path set;
   pipeline::SetLimits limits;
   std::optional<double> max_cross_px;
+  std::string format;  // of cameras of photos; empty: by their content
   ValidateCalibrationOptions calibration;
 };
-
-void SayReport(const pipeline::SetValidation& report, Console& console) {
-  console.Say(fmt::format("{:<24} {:>7} {:>8} {:>8} {:>8} {:>8}", "camera (held-out, px)", "count",
-                          "RMS", "median", "95 %", "worst"));
-  for (const auto& camera : report.cameras) {
-    const auto& held_out = camera.held_out;
-    console.Say(fmt::format("{:<24} {:>7} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f}", camera.name,
-                            held_out.count, held_out.rms_px, held_out.median_px, held_out.p95_px,
-                            held_out.worst_px));
-  }
-  for (const Check& test : report.tests) console.Say(calib::LineOf(test));
-  if (!report.adjustment.not_validated.empty()) {
-    console.Say("not validated by a fresh bundle adjustment: " + report.adjustment.not_validated);
-  }
-  for (const std::string& name : report.untested) {
-    console.Say("not tested, too few observations: " + name);
-  }
-  for (const std::string& name : report.kept_apart) {
-    console.Say("not tested, held out without observations; dtr evaluate measures by it: " + name);
-  }
-}
 
 void RejectForSets(const ValidateCalibrationOptions& options) {
   for (const auto& [given, name] :
@@ -53,17 +32,13 @@ void RejectForSets(const ValidateCalibrationOptions& options) {
         std::pair{options.board.has_value(), "--board"},
         std::pair{options.max_uncertainty_px.has_value(), "--max-uncertainty"},
         std::pair{!options.at.empty(), "--at"}}) {
-    if (given) throw UsageError(fmt::format("{}: is for calibration files, not for sets", name));
+    if (!given) continue;
+    throw UsageError(fmt::format("{}: is for cameras and calibrations, not for sets", name));
   }
 }
 
 // What concerns calibration files alone.
 void AddCalibrationOptions(CLI::App& command, ValidateCalibrationOptions& calibration) {
-  command
-      .add_option("--images", calibration.images,
-                  "Photos of the board that the calibration has not seen; without them it is "
-                  "validated on those it was made from")
-      ->type_name("DIR");
   command
       .add_option("--pattern", calibration.pattern,
                   "Only photos of these names, as 'left*.jpg' [*]")
@@ -89,7 +64,33 @@ void AddCalibrationOptions(CLI::App& command, ValidateCalibrationOptions& calibr
       ->type_name("D,...");
 }
 
+int RunCameras(const ValidateArguments& options, const Context& context) {
+  const ValidateCalibrationOptions& given = options.calibration;
+  if (options.max_cross_px) throw UsageError("--max-cross: is for sets, which have depth");
+  if (given.pattern || given.board || given.max_uncertainty_px || !given.at.empty()) {
+    throw UsageError(options.set.string() +
+                     ": --pattern, --board, --max-uncertainty and --at are for calibrations of "
+                     "boards, not for cameras of photos");
+  }
+  const ValidateCamerasOptions cameras{options.set, options.format, given.images.value_or(""),
+                                       given.report, options.limits};
+  if constexpr (DTR_WITH_IMPORT) {
+    return RunValidateCameras(cameras, context);
+  } else {
+    throw UsageError(BuiltWithout("validate CAMERAS"));
+  }
+}
+
 int RunValidate(ValidateArguments options, const Context& context) {
+  options.limits.max_cross_px = options.max_cross_px.value_or(options.limits.max_cross_px);
+  double& max_rms_px = options.limits.reprojection.max_rms_px;
+  max_rms_px = options.calibration.max_rms_px.value_or(max_rms_px);
+  if (const auto& page = options.calibration.report) {
+    RequireOutputFile(*page, "--report", {".html"});
+  }
+  if (AreCamerasOfPhotos(options.set, options.format, options.calibration.images.has_value())) {
+    return RunCameras(options, context);
+  }
   if (std::filesystem::is_regular_file(options.set)) {
     if (options.max_cross_px) {
       throw UsageError("--max-cross: is for sets, not for calibration files");
@@ -101,25 +102,13 @@ int RunValidate(ValidateArguments options, const Context& context) {
     if constexpr (DTR_WITH_BOARDS) return RunValidateCalibration(options.calibration, context);
   }
   RejectForSets(options.calibration);
-  double& max_rms_px = options.limits.reprojection.max_rms_px;
-  max_rms_px = options.calibration.max_rms_px.value_or(max_rms_px);
-  options.limits.max_cross_px = options.max_cross_px.value_or(options.limits.max_cross_px);
-  const auto& page = options.calibration.report;
-  if (page) RequireOutputFile(*page, "--report", {".html"});
-  const DtrSet set = io::ReadSet(options.set);
-  RequireOneFrame(set);
-  const SparseScene sparse = io::LoadSparse(options.set, set);
-  const auto report =
-      pipeline::ValidateSet(options.set, set, sparse, options.limits, context.console);
-  SayReport(report, context.console);
-  if (page) {
-    const std::string name = options.set.lexically_normal().filename().string();
-    WriteFileAtomically(
-        *page, pipeline::ValidationPage(options.set, set, report, "Calibration of " + name));
-    context.console.Say("report: " + page->string());
-  }
+  const ValidatedSet validated = ValidateOneSet(options.set, options.limits, context);
+  const pipeline::SetValidation& report = validated.report;
+  const std::string conclusion = calib::Conclusion(report.tests, calib::Validated::kPhotos);
+  WritePage(options.calibration.report, options.set, validated,
+            options.set.lexically_normal().filename().string(), conclusion, context.console);
   context.EmitJson(pipeline::ToJson(report));
-  context.console.Say(calib::Conclusion(report.tests, calib::Validated::kPhotos));
+  context.console.Say(conclusion);
   return report.passed() ? kDone : kFailed;
 }
 
@@ -127,16 +116,25 @@ int RunValidate(ValidateArguments options, const Context& context) {
 
 void AddValidateCommand(CLI::App& app) {
   AddCommand(
-      app, "validate", "Test the calibration of a set or of a board; exit 1 when a test fails",
+      app, "validate",
+      "Test cameras of a set, another program or a board; exit 1: a test failed, 3: not decidable",
       "dtr validate left.json --images held_out/ --report left.html",
       [](CLI::App& command) -> Action {
         auto options = std::make_shared<ValidateArguments>();
         command
-            .add_option("SET|CALIB", options->set,
-                        "A set, a .json file of calibrate board or calibrate rig, or one camera "
-                        "from elsewhere: a .yml of OpenCV, a cameras.txt of COLMAP")
+            .add_option("SET|CAMERAS|CALIB", options->set,
+                        "A set; cameras of photos in any format of `dtr import`; or a calibration "
+                        "of boards: a .json of calibrate board or rig, a .yml of OpenCV, a "
+                        "cameras.txt of COLMAP")
             ->required();
         ValidateCalibrationOptions& calibration = options->calibration;
+        command
+            .add_option("--images", calibration.images,
+                        "Of cameras: their photos. Of a calibration: photos of the board that it "
+                        "has not seen [those it was made from]")
+            ->type_name("DIR");
+        command.add_option("--format", options->format, "Format of the cameras [by their content]")
+            ->check(CLI::IsMember(pipeline::CameraFormats()));
         command
             .add_option("--max-rms", calibration.max_rms_px,
                         fmt::format("Limit of the RMS on what the calibration has not seen [{} for "

@@ -18,6 +18,18 @@ class UsageError : public Error {
   using Error::Error;
 };
 
+/// The photos do not show enough to decide what was asked.
+class NotDecidable : public Error {
+ public:
+  using Error::Error;
+};
+
+/// Cameras that were given contradict their photos, and what explains it is in the message.
+class CamerasContradicted : public Error {
+ public:
+  using Error::Error;
+};
+
 /// The user asked to stop (Ctrl-C). What was finished is kept. Exit code 1.
 class Interrupted : public Error {
  public:

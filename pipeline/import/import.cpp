@@ -67,6 +67,7 @@ CamerasFromFile WithMasks(CamerasFromFile cameras, const ImportRequest& request,
 // What is asked for, else what the file says.
 std::set<std::string> HeldOut(const ImportRequest& request, const CamerasFromFile& cameras,
                               Progress& progress) {
+  if (request.cameras_alone) return {};
   if (!cameras.held_out) return NamesHeldOut(request.holdout, cameras.list);
   if (!request.holdout.empty()) {
     progress.Note("`holdout` replaces train_filenames, test_filenames and val_filenames of " +
@@ -223,7 +224,7 @@ ImportOptions OptionsFor(const ImportRequest& request, const CamerasFromFile& ca
 // The request with a capture's own folders where it names none.
 ImportRequest WithFolders(ImportRequest request, const CamerasFromFile& cameras) {
   if (request.images.empty()) request.images = cameras.images_dir;
-  if (request.depth.empty()) request.depth = cameras.depth_dir;
+  if (request.depth.empty() && !request.cameras_alone) request.depth = cameras.depth_dir;
   return request;
 }
 
@@ -280,6 +281,11 @@ ImportReport Import(const ImportRequest& asked, Progress& listener) {
   report.contents = ContentsFor(options, cameras.list);
   listener.Note(capture::LineOf(report.contents));
   CamerasAndPoints found = FindPoints(request, options, std::move(cameras), progress);
+  if (request.cameras_alone && (!found.points || found.points->points.empty())) {
+    throw NotDecidable(request.cameras.string() +
+                       ": no two photos show a point whose position these cameras give; photos "
+                       "must overlap, from different positions");
+  }
   options.calibration = std::move(found.report);
   report.alpha = ImportSet(found.cameras.list, options, request.output, request.force,
                            found.points ? &*found.points : nullptr, progress);

@@ -21,6 +21,8 @@ struct ImportRequest {
   std::filesystem::path images;   ///< folder of the images; empty: a capture's own
   std::filesystem::path depth;    ///< folder of depth maps; empty: a capture's own, or points alone
   std::filesystem::path masks;    ///< empty: where `cameras` says, else `masks` beside the images
+  /// To test the cameras: no depth, not that of a capture either, and no view is held out.
+  bool cameras_alone = false;
   std::optional<DepthKind> depth_kind;  ///< empty: what `cameras` says of each
   std::optional<double> depth_unit;     ///< scene units per number of a depth map
   std::string holdout;                  ///< "", "every:N" or names: views without depth

@@ -47,11 +47,12 @@ std::string ToJson(const SetValidation& report);
 SetValidation ValidateSet(const std::filesystem::path& folder, const DtrSet& set,
                           const SparseScene& sparse, const SetLimits& limits, Progress& progress);
 
-/// That as a page. Result and tests; a table of the views; for every size of image, all views
-/// together: residual vectors, coverage, and how uncertain the image is where the fresh bundle
-/// adjustment gave it; and the worst views, drawn over their images, read from `folder` one at a
-/// time. `set` and `report` belong together. Deterministic.
+/// That as a page. `conclusion`, the tests; a table of the views; for every size of image, all
+/// views together: residual vectors, coverage, and how uncertain the image is where the fresh
+/// bundle adjustment gave it; and the worst views, drawn over their images, read from `folder` one
+/// at a time. `set` and `report` belong together. Deterministic.
 std::string ValidationPage(const std::filesystem::path& folder, const DtrSet& set,
-                           const SetValidation& report, const std::string& title);
+                           const SetValidation& report, const std::string& title,
+                           const std::string& conclusion);
 
 }  // namespace dtr::pipeline

@@ -116,7 +116,7 @@ TEST_F(Rejections, ASetWithoutPointsServesNothingThatNeedsThem) {
        "expected sparse points to find depth ranges from, found none; build the set",
        {"stereo", set, "-o", In("other.dtr")}},
       {kWrongUsage,
-       "--images: is for calibration files, not for sets",
+       "--images: is for cameras and calibrations, not for sets",
        {"validate", set, "--images", Photos()}},
   });
 }

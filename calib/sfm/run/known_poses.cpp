@@ -161,7 +161,7 @@ std::vector<std::string> ImagesWithoutPoints(const calib::SfmModel& model) {
 
 void RequireMatches(size_t pairs, size_t photos) {
   if (pairs > 0) return;
-  throw Error(fmt::format(
+  throw NotDecidable(fmt::format(
       "expected photos that show the same points to triangulate, found that no two of the {} have "
       "any in common; photos must overlap and show texture",
       photos));

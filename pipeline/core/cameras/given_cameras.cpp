@@ -156,7 +156,7 @@ TriangulatedCameras TriangulateAndTest(const GivenPhotos& given, Progress& progr
     const calib::ConventionReport report =
         TestAlone(given, images, SomeOf(images.size()), progress);
     if (report.found.empty()) throw;
-    throw Error(std::string(error.what()) + "; " + calib::LineOf(report, given.file));
+    throw CamerasContradicted(std::string(error.what()) + "; " + calib::LineOf(report, given.file));
   }
   // COLMAP's matches are its own affair; its triangulation is tested by the set's points.
   const bool by_colmap = given.sfm.engine == sfm::SfmEngine::kColmap;

@@ -188,10 +188,10 @@ void AddWorstViews(report::HtmlReport& page, const fs::path& folder, const std::
 }  // namespace
 
 std::string ValidationPage(const fs::path& folder, const DtrSet& set, const SetValidation& report,
-                           const std::string& title) {
+                           const std::string& title, const std::string& conclusion) {
   const std::vector<View>& views = set.frames.front().views;
   report::HtmlReport page(title);
-  page.Result(report.passed(), calib::Conclusion(report.tests, calib::Validated::kPhotos));
+  page.Result(report.passed(), conclusion);
   page.Section("Validation of the calibration");
   report::AddChecks(page, report.tests);
   if (!report.adjustment.not_validated.empty()) {

@@ -36,13 +36,32 @@ TEST(Conclusion, SaysWhatFailedAndWhatToDo) {
 // The remedy is that of what causes the rest, wherever it stands in the list.
 TEST(Conclusion, NamesACauseBeforeWhatItCauses) {
   std::vector<Check> tests;
-  for (const char* name : {"image_shift_px", "halves_ratio", "stored_rms_px", "mean_residual_px",
-                           "degeneracies"}) {
+  for (const char* name :
+       {"image_shift_px", "halves_ratio", "stored_rms_px", "mean_residual_px", "degeneracies"}) {
     tests.push_back(AtMost(name, 9, 1, ""));
   }
   const std::string line = Conclusion(tests, Validated::kPhotos);
   EXPECT_THAT(line, HasSubstr("and 1 more; " + RemedyOf("degeneracies", Validated::kPhotos)));
   EXPECT_THAT(line, Not(HasSubstr("\n")));
+}
+
+TEST(AnswerLine, IsRightWrongOrNotDecidable) {
+  const Check good = AtMost("held_out_rms_px", 0.2, 1, ""),
+              few = AtMost("cameras_untested", 2, 0, "0003.jpg"),
+              unmeasured = NotTested("halves_ratio", 3, "too few points"),
+              bad = AtMost("camera_difference_sigmas", 35, 5, "0003.jpg: its stored pose");
+  EXPECT_EQ(AnswerOf(std::vector{good}), Answer::kRight);
+  EXPECT_EQ(AnswerLine(std::vector{good}, 16, 0.842),
+            "right: 95 % of what 16 photos show lies within 0.84 px of where the other photos "
+            "predict it");
+  EXPECT_EQ(AnswerOf(std::vector{good, few, unmeasured}), Answer::kUndecided);
+  EXPECT_THAT(
+      AnswerLine(std::vector{few}, 16, 1),
+      HasSubstr("not decidable: cameras_untested: 2 (at most 0): 0003.jpg; take more photos"));
+  EXPECT_EQ(AnswerOf(std::vector{few, bad}), Answer::kWrong);
+  EXPECT_THAT(AnswerLine(std::vector{few, bad}, 16, 1),
+              HasSubstr("wrong: camera_difference_sigmas: 35 (at most 5): 0003.jpg"));
+  EXPECT_EQ(AnswerOf({}), Answer::kUndecided);
 }
 
 // What no validation has made yet has no remedy; what one makes has.
@@ -52,7 +71,9 @@ TEST(RemedyOf, EveryTestHasOne) {
     for (const Check& test : tests) EXPECT_NE(RemedyOf(test.name, what), "") << test.name;
   };
   has_all(ValidateBoards(testing::Honest(1).calibration, {}, {}).tests, Validated::kBoards);
-  has_all(ValidatePhotos(dtr::testing::bundle::MakeBundle({.images = 6, .points = 200, .noise_px = 0.3}), {}).tests,
+  has_all(ValidatePhotos(
+              dtr::testing::bundle::MakeBundle({.images = 6, .points = 200, .noise_px = 0.3}), {})
+              .tests,
           Validated::kPhotos);
   for (const char* name : {"test_rms_px", "test_rms_ratio", "rig_scale_sigmas"}) {
     EXPECT_NE(RemedyOf(name, Validated::kBoards), "") << name;
