@@ -45,9 +45,9 @@ void SayResult(const PruneArguments& options, const pipeline::PruneSetReport& re
     console.Note(
         "WARNING: held-out photos lose more than was allowed; give a smaller --max-loss-db");
   }
-  if (!pruned.put_back.empty()) {
-    console.Say(fmt::format("  {} decisions taken back, as other positions showed more loss",
-                            pruned.put_back.size()));
+  if (const size_t count = pruned.put_back.size(); count > 0) {
+    console.Say(fmt::format("  {} decision{} taken back, as other positions showed more loss",
+                            count, count == 1 ? "" : "s"));
   }
   const auto render = RenderOptionArguments(pruned.setting.render);
   console.Say(fmt::format("  dtr info {} says what was left out; drawn with: {}",
