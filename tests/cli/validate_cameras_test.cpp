@@ -28,13 +28,15 @@ class ValidateCameras : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     shared_ = new TemporaryFolder;
-    MakeSmallCourtyard(shared_->path());
+    MakeSmallCourtyard(shared_->path() / "courtyard");
   }
   static void TearDownTestSuite() {
     delete shared_;
     shared_ = nullptr;
   }
-  static std::string Of(const std::string& name) { return (*shared_ / name).string(); }
+  static std::string Of(const std::string& name) {
+    return (*shared_ / "courtyard" / name).string();
+  }
 
   /// The true cameras with a change.
   std::string Changed(const std::function<void(Json& views)>& change) const {
@@ -84,11 +86,11 @@ TEST_F(ValidateCameras, WrongOnesAreNamedWithWhatToDo) {
   EXPECT_THAT(Answer(Changed([](Json& views) {
                        for (Json& view : views) {
                          for (const char* name : {"fx", "fy"})
-                           view[name] = 1.05 * view[name].get<double>();
+                           view[name] = 1.15 * view[name].get<double>();
                        }
                      }),
                      kFailed),
-              HasSubstr("f_px: stored 156.8"));
+              HasSubstr("f_px: stored 171.7"));
   EXPECT_THAT(Answer(Changed([](Json& views) {
                        std::swap(views[2]["cam_from_world"], views[3]["cam_from_world"]);
                      }),
@@ -101,7 +103,7 @@ TEST_F(ValidateCameras, TwoPhotosDecideNothing) {
                        views = Json{views[2], views[3]};
                      }),
                      kUndecided),
-              HasSubstr("take more photos between"));
+              HasSubstr("too_few_views: 2 images: nothing can be held out"));
 }
 
 // Photos of one colour each have no features.
