@@ -116,8 +116,7 @@ int RunValidate(ValidateArguments options, const Context& context) {
 
 void AddValidateCommand(CLI::App& app) {
   AddCommand(
-      app, "validate",
-      "Test cameras of a set, another program or a board; exit 1: a test failed, 3: not decidable",
+      app, "validate", "Test the cameras of a set, another program or a board",
       "dtr validate left.json --images held_out/ --report left.html",
       [](CLI::App& command) -> Action {
         auto options = std::make_shared<ValidateArguments>();

@@ -15,8 +15,8 @@ using Inspect = SmallCourtyardSet;
 TEST_F(Inspect, WritesOnePageThatNeedsNothingElseTheSameEveryTime) {
   DtrOk({"inspect", Set(), "-o", In("one.html"), "--threads", "1"});
   const std::string page = Text(In("one.html"));
-  for (const char* section : {"Validation of the calibration", "Photos, depth, uncertainty",
-                              "From above", "Worst views", "Which view contributes where"}) {
+  for (const char* section : {"Photos, depth, uncertainty", "From above", "Worst views",
+                              "Which view contributes where"}) {
     EXPECT_THAT(page, HasSubstr(section));
   }
   EXPECT_THAT(page, HasSubstr("0001.jpg"));
