@@ -7,6 +7,8 @@ namespace dtr::stereo {
 namespace {
 
 constexpr float kSeenThroughPx = 2;  // cells of disparity
+/// Levels between colours: at most of one surface, and at least of two.
+constexpr float kOneSurface = 6, kTwoSurfaces = 18;
 
 /// Bilinear; false where a cell around is masked.
 bool ColourAt(const CellView& cells, float x, float y, float* rgb) {
@@ -50,9 +52,11 @@ struct Agreement::Answers {
   /// Of the two that agree best: others may not see the place, though nothing says so.
   float best[2];
   int asked = 0, answers = 0, hidden = 0, through = 0, elsewhere = 0;
+  float unlike = 0;
 
   void AddColour(float difference) {
     ++answers;
+    unlike += std::clamp((difference - kOneSurface) / (kTwoSurfaces - kOneSurface), 0.0F, 1.0F);
     if (difference < best[0]) {
       best[1] = best[0], best[0] = difference;
     } else {
@@ -75,14 +79,22 @@ struct Agreement::Answers {
   }
 };
 
-float Agreement::CostAt(int x, int y, float w) const {
+Agreement::Answers Agreement::AskAll(int x, int y, float w) const {
   const Eigen::Vector3f ray = view_.RayOf(x, y);
   Answers answers{{weights_.max_colour, weights_.max_colour}};
   for (const Other& other : others_) {
     const Eigen::Vector3f p = other.turn * ray + w * other.shift;
     if (p.z() > 0) Ask(other, p.x() / p.z(), p.y() / p.z(), w / p.z(), x, y, answers);
   }
-  return answers.Cost(weights_);
+  return answers;
+}
+
+float Agreement::CostAt(int x, int y, float w) const { return AskAll(x, y, w).Cost(weights_); }
+
+std::optional<float> Agreement::ContradictionAt(int x, int y, float w) const {
+  const Answers answers = AskAll(x, y, w);
+  if (answers.asked == answers.hidden) return std::nullopt;
+  return answers.unlike / static_cast<float>(answers.asked - answers.hidden);
 }
 
 void Agreement::Ask(const Other& other, float u, float v, float there, int x, int y,

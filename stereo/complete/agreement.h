@@ -1,6 +1,7 @@
 // stereo/complete/agreement.h -- how well the views around agree that a surface is at a depth.
 #pragma once
 #include <Eigen/Core>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -29,6 +30,10 @@ class Agreement {
   /// What it costs to put cell (x, y) at inverse depth w along its ray; 0 is infinitely far.
   float CostAt(int x, int y, float w) const;
 
+  /// By how much the views from which nothing measured hides the place contradict it, all of them,
+  /// by its colour: 0 to 1; empty where there is no such view.
+  std::optional<float> ContradictionAt(int x, int y, float w) const;
+
  private:
   struct Other {
     const CellView* cells;
@@ -38,6 +43,7 @@ class Agreement {
     float same;             ///< difference of its inverse depth up to which it is one surface
   };
   struct Answers;
+  Answers AskAll(int x, int y, float w) const;
   /// Of a view, what it has at its position (u, v) to say of cell (x, y) at inverse depth `there`
   /// before that view.
   void Ask(const Other& other, float u, float v, float there, int x, int y, Answers& answers) const;

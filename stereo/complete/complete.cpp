@@ -4,6 +4,7 @@
 #include <atomic>
 
 #include "dtr/base/parallel_for.h"
+#include "stereo/complete/outline_planes.h"
 #include "stereo/complete/scene_planes.h"
 
 namespace dtr::stereo {
@@ -50,8 +51,15 @@ std::vector<CompletedCells> CompleteCells(std::span<const CellView> views,
                                           std::span<const ScenePlane> planes, int at_once,
                                           Progress& progress) {
   const int count = static_cast<int>(views.size());
-  progress.Stage("completion", kPasses * count);
+  progress.Stage("completion", (1 + kPasses) * count);
   std::atomic<int> done = 0;
+  std::vector<Grid<float>> by_outline(views.size());
+  ParallelFor(0, count, at_once, [&](int i) {
+    progress.ThrowIfInterrupted();
+    const auto v = static_cast<size_t>(i);
+    by_outline[v] = OutlinePlanes(views[v], AroundOf(views, neighbours[v], {}).cells, planes);
+    progress.Update(++done);
+  });
   std::vector<CompletedCells> completed;
   for (int pass = 0; pass < kPasses; ++pass) {
     std::vector<CompletedCells> next(views.size());
@@ -59,7 +67,7 @@ std::vector<CompletedCells> CompleteCells(std::span<const CellView> views,
       progress.ThrowIfInterrupted();
       const auto v = static_cast<size_t>(i);
       const Around around = AroundOf(views, neighbours[v], completed);
-      next[v] = LabelCells(views[v], around.cells, around.completed, planes, {});
+      next[v] = LabelCells(views[v], around.cells, around.completed, planes, by_outline[v], {});
       progress.Update(++done);
     });
     completed = std::move(next);
@@ -72,7 +80,7 @@ CompletionMemory CompletionMemoryOf(std::span<const PinholeCamera> cameras) {
   CompletionMemory memory;
   for (const PinholeCamera& camera : cameras) {
     const auto cells = static_cast<double>(CellBytes(camera));
-    memory.cells_bytes += 2 * cells;  // with two passes' planes
+    memory.cells_bytes += 2.5 * cells;  // with the planes of two passes and of outlines
     // Of each label a plane and two costs: 20 bytes, where a cell has 30.
     memory.view_bytes = std::max(memory.view_bytes, cells * kLabels);
   }

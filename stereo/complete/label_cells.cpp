@@ -17,7 +17,8 @@ constexpr std::array<std::array<int, 2>, kDirections> kSteps = {
     {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {-1, -1}, {1, -1}, {-1, 1}}};
 // Which candidate is which. A measured cell has one alone, its own plane, in the place of far.
 constexpr int kFirstDirection = 1, kFirstCarried = kFirstDirection + kDirections;
-constexpr int kCarried = 2, kByColour = kFirstCarried + kCarried, kFirstScenePlane = kByColour + 1;
+constexpr int kCarried = 2, kByColour = kFirstCarried + kCarried, kByOutline = kByColour + 1;
+constexpr int kFirstScenePlane = kByOutline + 1;
 static_assert(kFirstScenePlane == kOwnLabels);
 constexpr float kSamePx = 2;  // cells of disparity: the same surface
 constexpr int kInset = 1;     // cells from a rim, where planes are taken from
@@ -61,7 +62,7 @@ class Labelling {
  public:
   Labelling(const CellView& view, std::span<const CellView* const> others,
             std::span<const CompletedCells* const> completed, std::span<const ScenePlane> planes,
-            const LabelWeights& weights)
+            const Grid<float>& by_outline, const LabelWeights& weights)
       : view_(view),
         weights_(weights),
         others_(others),
@@ -74,6 +75,7 @@ class Labelling {
     AddDirections();
     AddCarried();
     AddNearestByColour();
+    AddByOutline(by_outline);
     AddScenePlanes(planes);
     SetCosts();
   }
@@ -216,6 +218,15 @@ class Labelling {
     }
   }
 
+  void AddByOutline(const Grid<float>& planes) {
+    for (int y = 0; y < rows_; ++y) {
+      for (int x = 0; x < columns_; ++x) {
+        const ViewPlane plane(planes(x, y, 0), planes(x, y, 1), planes(x, y, 2));
+        if (!Measured(x, y) && !plane.isZero()) candidates_.PlanesOf(x, y)[kByOutline] = plane;
+      }
+    }
+  }
+
   void AddScenePlanes(std::span<const ScenePlane> planes) {
     int label = kFirstScenePlane;
     for (const ScenePlane& plane : planes) {
@@ -317,8 +328,9 @@ class Labelling {
 
 CompletedCells LabelCells(const CellView& view, std::span<const CellView* const> others,
                           std::span<const CompletedCells* const> completed,
-                          std::span<const ScenePlane> planes, const LabelWeights& weights) {
-  return Labelling(view, others, completed, planes, weights).Solve();
+                          std::span<const ScenePlane> planes, const Grid<float>& by_outline,
+                          const LabelWeights& weights) {
+  return Labelling(view, others, completed, planes, by_outline, weights).Solve();
 }
 
 }  // namespace dtr::stereo

@@ -10,8 +10,8 @@
 namespace dtr::stereo {
 
 /// Candidates of a cell beside the planes of the scene: far, eight directions, two of other views,
-/// the one at the smallest geodesic distance.
-inline constexpr int kOwnLabels = 12;
+/// the one at the smallest geodesic distance, that of its area's outline.
+inline constexpr int kOwnLabels = 13;
 
 /// What LabelCells weighs. Costs are in levels of sRGB.
 struct LabelWeights {
@@ -31,9 +31,10 @@ struct CompletedCells {
 };
 
 /// `others`: neighbours of the view, best first. `completed`: what an earlier pass gave for these,
-/// in their order; empty in the first pass.
+/// in their order; empty in the first pass. `by_outline`: OutlinePlanes of the view.
 CompletedCells LabelCells(const CellView& view, std::span<const CellView* const> others,
                           std::span<const CompletedCells* const> completed,
-                          std::span<const ScenePlane> planes, const LabelWeights& weights);
+                          std::span<const ScenePlane> planes, const Grid<float>& by_outline,
+                          const LabelWeights& weights);
 
 }  // namespace dtr::stereo

@@ -6,6 +6,7 @@
 
 #include "datasets/exact/analytic_scene.h"
 #include "stereo/complete/expand.h"
+#include "stereo/complete/outline_planes.h"
 #include "tests/support/on_threads.h"
 
 namespace dtr::stereo {
@@ -70,8 +71,8 @@ struct Row {
   }
 
   /// A black letter L stands before the wall. Of its depth the top of the upright stroke is
-  /// measured.
-  void PutBefore() {
+  /// measured, down to y = `measured_to`.
+  void PutBefore(double measured_to = -0.5) {
     constexpr double kZ = 5;
     for (size_t i = 0; i < views.size(); ++i) {
       View& view = views[i];
@@ -86,7 +87,7 @@ struct Row {
           if (!upright && !foot) continue;
           for (int c = 0; c < 3; ++c) view.image(x, y, c) = 20;
           truth[i](x, y) = static_cast<float>((view.cam_from_world * p).z());
-          view.depth(x, y) = p.y() < -0.5 ? truth[i](x, y) : 0;
+          view.depth(x, y) = p.y() < measured_to ? truth[i](x, y) : 0;
         }
       }
     }
@@ -145,6 +146,28 @@ TEST(CompleteDepth, ASurfaceWithoutTextureGoesOnToItsOutline) {
   Row row;
   row.PutBefore();
   EXPECT_GT(row.ShareRight(row.Completed(1, false)), 0.75);
+}
+
+// Of the letter nothing is measured, of all around it the wall.
+TEST(OutlinePlanes, ASurfaceWithoutTextureLiesWhereItsOutlineIsOneInAllViews) {
+  Row row;
+  row.PutBefore(-1);
+  std::vector<CellView> cells;
+  for (const View& view : row.views) cells.push_back(MakeCells(view));
+  const std::vector<const CellView*> others = {&cells[0], &cells[1], &cells[3], &cells[4]};
+  const Grid<float> planes = OutlinePlanes(cells[2], others, {});
+  int right = 0, letter = 0;
+  for (int y = 0; y < cells[2].colour.height(); ++y) {
+    for (int x = 0; x < cells[2].colour.width(); ++x) {
+      if (cells[2].colour(x, y, 0) > 25 || cells[2].inverse_depth(x, y) > 0) continue;
+      ++letter;
+      const ViewPlane plane(planes(x, y, 0), planes(x, y, 1), planes(x, y, 2));
+      const float z = row.truth[2](x * cells[2].cell_px, y * cells[2].cell_px);
+      right += std::abs(plane.dot(cells[2].RayOf(x, y)) * z - 1) < 0.05F;
+    }
+  }
+  ASSERT_GT(letter, 500);
+  EXPECT_GT(right, 0.9 * letter);
 }
 
 TEST(CompleteDepth, SkyIsFar) {
