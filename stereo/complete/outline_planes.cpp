@@ -41,7 +41,7 @@ class Areas {
     }
     return cell;
   }
-  /// Where the difference across their border is not much larger than those inside.
+  /// Joins them unless the difference across their border is much larger than those inside.
   void Join(int a, int b, float levels) {
     a = Of(a), b = Of(b);
     if (a == b || levels > Bound(a) || levels > Bound(b)) return;

@@ -13,7 +13,7 @@ namespace dtr::stereo {
 /// its area; -1 where something was measured or the cell is masked.
 std::vector<int> AreasOfOneColour(const CellView& view);
 
-/// Of each cell without measured depth a plane on which the outline of its area lies at the same
+/// Gives each cell without measured depth a plane on which the outline of its area lies at the same
 /// place in all views: planes that face the camera and such parallel to those of the scene are
 /// swept through the area. Where a surface that was measured nearer ends, the outline is that
 /// surface's, and says nothing. 3 channels: ViewPlane; zero where no plane is much better than

@@ -148,7 +148,7 @@ TEST(CompleteDepth, ASurfaceWithoutTextureGoesOnToItsOutline) {
   EXPECT_GT(row.ShareRight(row.Completed(1, false)), 0.75);
 }
 
-// Of the letter nothing is measured, of all around it the wall.
+// Nothing is measured of the letter; the wall is, all around it.
 TEST(OutlinePlanes, ASurfaceWithoutTextureLiesWhereItsOutlineIsOneInAllViews) {
   Row row;
   row.PutBefore(-1);
